@@ -43,23 +43,9 @@ if TYPE_CHECKING:
     from mpc.winch import ProcessNoise, Weights, tune_weights
     from synth.bound import BestPossible, Bound, bound_for, exact_sensors
     from synth.controllers import BrakeOn, ConstantTension, LinearFeedback, VelocityFeedForward
-    from synth.design import (
-        Design,
-        Look,
-        View,
-        evaluate_gains,
-        optimise_gains,
-        prepare,
-        tune,
-    )
+    from synth.design import Design, Look, View, evaluate_gains, optimise_gains, prepare, tune
     from synth.operability import Operability, operability
-    from synth.robust import (
-        Family,
-        Robustness,
-        optimise_robust,
-        robustness,
-        schedule_gains,
-    )
+    from synth.robust import Family, Robustness, optimise_robust, robustness, schedule_gains
     from synth.sensitivity import Sensitivity, morris_screening, sensitivity, sobol_indices
     from synth.sizing import co_design, pareto_front, size_winch, worth
 

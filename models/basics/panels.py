@@ -140,10 +140,7 @@ def cut_panels(
         done += [(float(a), float(b)) for a, b in panels[~long]]
         middle = panels[long].mean(axis=1)
         panels = np.concatenate(
-            [
-                np.column_stack([panels[long, 0], middle]),
-                np.column_stack([middle, panels[long, 1]]),
-            ]
+            [np.column_stack([panels[long, 0], middle]), np.column_stack([middle, panels[long, 1]])]
         )
     return sorted(done)
 

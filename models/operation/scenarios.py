@@ -99,9 +99,7 @@ _WAIT = time_option(120.0, "time before it")
 
 _RECIPES: Mapping[str, ScenarioRecipe] = {
     "hold": ScenarioRecipe(
-        description="hold station, the controller engaged from the start",
-        build=_hold,
-        options={},
+        description="hold station, the controller engaged from the start", build=_hold, options={}
     ),
     "engage": ScenarioRecipe(
         description="warm up with the brake on, engage, hold, disengage",

@@ -37,10 +37,7 @@ def stochastic_equivalent(quadratic: float, sigma: float) -> float:
 
 
 def consistent_drag(
-    quadratic: float,
-    velocity_rms: Callable[[float], float],
-    *,
-    tolerance: float = 1e-10,
+    quadratic: float, velocity_rms: Callable[[float], float], *, tolerance: float = 1e-10
 ) -> float:
     """Return the C that agrees with the motion it leads to [N s/m].
 

@@ -384,10 +384,7 @@ class LinearPlant(ReadOnlyArrays):
         )
 
     def select(
-        self,
-        *,
-        outputs: Sequence[str] | None = None,
-        measurements: Sequence[str] | None = None,
+        self, *, outputs: Sequence[str] | None = None, measurements: Sequence[str] | None = None
     ) -> LinearPlant:
         """Return the plant with some outputs and measurements only, in the order given.
 
@@ -479,8 +476,7 @@ class LinearPlant(ReadOnlyArrays):
         names = [f"{self.measurements[i]}.hold{j + 1}" for i in held for j in range(3)]
         filtered = self._with_filters(A2, B2, C2, D2, names)
         return filtered._with(
-            delays=tuple(max(0.0, delay - 0.5 * hold) for delay, hold in late),
-            holds=(0.0,) * ny,
+            delays=tuple(max(0.0, delay - 0.5 * hold) for delay, hold in late), holds=(0.0,) * ny
         )
 
     def _with_filters(

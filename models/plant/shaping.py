@@ -151,10 +151,7 @@ def fit_shaping_filter(
 
 
 def sampled_density(
-    owner: str,
-    density: Callable[[FloatArray], FloatArray],
-    band: tuple[float, float],
-    nodes: int,
+    owner: str, density: Callable[[FloatArray], FloatArray], band: tuple[float, float], nodes: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return nodes of a band evenly in the logarithm, their widths, the density, its variance.
 

@@ -174,10 +174,7 @@ def _factor(name: str, unit: str, owner: str) -> float:
 
 
 def _list(
-    header: Sequence[str],
-    body: list[tuple[int, list[str]]],
-    owner: str,
-    line: int,
+    header: Sequence[str], body: list[tuple[int, list[str]]], owner: str, line: int
 ) -> dict[str, Any]:
     named = [_name(cell) for cell in header]
     if body and _is_units_row(body[0][1]):

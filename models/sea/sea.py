@@ -162,11 +162,7 @@ class SeaSpectrum:
 
     @classmethod
     def from_table(
-        cls,
-        omega: npt.ArrayLike,
-        density: npt.ArrayLike,
-        *,
-        beyond: str = "decay",
+        cls, omega: npt.ArrayLike, density: npt.ArrayLike, *, beyond: str = "decay"
     ) -> SeaSpectrum:
         """Return a measured sea; :meth:`scaled` gives it another height.
 

@@ -439,11 +439,7 @@ _SeaOfOneKind = (
     | MeasuredSea
 )
 
-SeaPart = Annotated[
-    _SeaOfOneKind,
-    Field(discriminator="spectrum"),
-    BeforeValidator(_no_sum),
-]
+SeaPart = Annotated[_SeaOfOneKind, Field(discriminator="spectrum"), BeforeValidator(_no_sum)]
 """A sea that is no sum: what stands under `parts`."""
 
 

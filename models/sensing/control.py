@@ -146,10 +146,7 @@ class Recursion:
         object.__setattr__(self, "initial", read_only(initial.reshape(-1)))
         f, n = self.function, self.initial.size
         wanted = [[n, len(HEARD)], [n, 1]]
-        got = [
-            [f.numel_in(i) for i in range(f.n_in())],
-            [f.numel_out(i) for i in range(f.n_out())],
-        ]
+        got = [[f.numel_in(i) for i in range(f.n_in())], [f.numel_out(i) for i in range(f.n_out())]]
         if got != wanted:
             raise InputError(
                 f"recursion: function must take {wanted[0]} and return {wanted[1]} numbers "

@@ -32,12 +32,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import (
-    ComplexArray,
-    FloatArray,
-    ReadOnlyArrays,
-    read_only,
-)
+from ..basics import ComplexArray, FloatArray, ReadOnlyArrays, read_only
 from ..plant import hermite_hold, noisy_hold
 from ..rig import MRU
 from .draws import MRU_DRIFT, MRU_ERROR, MRU_NOISE, MRU_SIGNS, draw

@@ -44,12 +44,7 @@ RAW = (
     "rope.tension",
 )
 #: Columns of the table of standard normal numbers that a run needs.
-NOISE = (
-    "noise.acceleration",
-    "noise.velocity",
-    "noise.displacement",
-    "noise.tension",
-)
+NOISE = ("noise.acceleration", "noise.velocity", "noise.displacement", "noise.tension")
 _SENT = ("acceleration", "velocity", "displacement")
 _MRU = ("mru.heave", "mru.heave_rate", "mru.valid")
 _REFERENCE = ("reference.displacement", "reference.velocity", "reference.acceleration")
@@ -156,11 +151,7 @@ class SensorModel:
         return draw(check_seed("sensors", seed), SENSOR_NOISE, start, count, len(NOISE))
 
     def rows(
-        self,
-        noise: FloatArray,
-        telemetry: TelemetryBlock,
-        mru: MruBlock,
-        references: FloatArray,
+        self, noise: FloatArray, telemetry: TelemetryBlock, mru: MruBlock, references: FloatArray
     ) -> FloatArray:
         """Return the rows of a stretch of samples (n, len(row)).
 

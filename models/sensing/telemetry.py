@@ -21,13 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import (
-    BoolArray,
-    FloatArray,
-    InputError,
-    ReadOnlyArrays,
-    check_range,
-)
+from ..basics import BoolArray, FloatArray, InputError, ReadOnlyArrays, check_range
 from ..rig import Telemetry
 from .draws import TELEMETRY, draw
 

@@ -32,8 +32,7 @@ class HeaveTable(Section):
     """Heave of the hook per wave amplitude, as a table over frequency."""
 
     omega: Annotated[
-        tuple[Annotated[float, Quantity("frequency", 0.0, 20.0)], ...],
-        Field(min_length=2),
+        tuple[Annotated[float, Quantity("frequency", 0.0, 20.0)], ...], Field(min_length=2)
     ]
     """Frequencies, strictly ascending."""
     amplitude: tuple[Annotated[float, Quantity("ratio", 0.0, 50.0, unit="m/m")], ...]

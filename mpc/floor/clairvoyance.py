@@ -146,12 +146,7 @@ def clairvoyant(
 
     def problem(coefficient: float) -> RecordProblem:
         plant = record_plant(
-            case,
-            sample_time=sample_time,
-            drag=coefficient,
-            masses=masses,
-            limits=limits,
-            hold=hold,
+            case, sample_time=sample_time, drag=coefficient, masses=masses, limits=limits, hold=hold
         )
         return RecordProblem(
             plant=plant,

@@ -287,14 +287,7 @@ class KnotRegression:
     """
 
     def __init__(
-        self,
-        *,
-        sample_time: float,
-        spacing: int,
-        order: int,
-        steps: int,
-        every: int,
-        memory: float,
+        self, *, sample_time: float, spacing: int, order: int, steps: int, every: int, memory: float
     ) -> None:
         q, self._p, self._steps = spacing, order, steps
         recent = sorted({max(1, round(share * q)) for share in _RECENT})

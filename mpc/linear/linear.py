@@ -119,11 +119,7 @@ class LinearMPC(WinchMPC):
     """
 
     def __init__(
-        self,
-        case: Case,
-        *,
-        torque_rate: float | None = None,
-        **options: Unpack[WinchOptions],
+        self, case: Case, *, torque_rate: float | None = None, **options: Unpack[WinchOptions]
     ) -> None:
         if torque_rate is not None:
             check_range(

@@ -366,11 +366,7 @@ class DriveWindow:
         self._high = np.full(moves, (self.peak - winch.rest_torque) / unit)
 
     def bounds(
-        self,
-        speed: float,
-        speeds: FloatArray,
-        cap: float,
-        changes: FloatArray | None = None,
+        self, speed: float, speeds: FloatArray, cap: float, changes: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and the highest value of each move.
 

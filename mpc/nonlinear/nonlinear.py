@@ -218,11 +218,7 @@ class NonlinearMPC(WinchMPC):
         self._prepare()
 
     def optimise(
-        self,
-        chi: FloatArray,
-        *,
-        iterations: int = 50,
-        tolerance: float = 1e-8,
+        self, chi: FloatArray, *, iterations: int = 50, tolerance: float = 1e-8
     ) -> FloatArray:
         """Return the moves (nb,) for a state chi (n,), iterated until they change no more.
 

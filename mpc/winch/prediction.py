@@ -40,24 +40,13 @@ import scipy.linalg
 from models.basics import FloatArray, ReadOnlyArrays, SolverError, check_range, read_only
 from models.case import Case
 from models.hook import HookMotion
-from models.plant import (
-    MEASUREMENTS,
-    ShapingFilter,
-    fit_shaping_filter,
-    noisy_hold,
-    root_of,
-)
+from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter, noisy_hold, root_of
 from models.sensing import MEASURED, MruModel, SensorModel, low_pass_noise
 
 from .sampled import SampledWinch
 
 _OWNER = "prediction model"
-CONSTANTS = (
-    "payload.force",
-    "motor.torque",
-    "payload.acceleration_bias",
-    "rope.tension_bias",
-)
+CONSTANTS = ("payload.force", "motor.torque", "payload.acceleration_bias", "rope.tension_bias")
 #: What comes late, in the order of the first measurements.
 LATE = (*MEASUREMENTS, "mru.heave", "mru.heave_rate")
 _GRAVITY = 9.81
@@ -293,9 +282,7 @@ def with_noise(model: PredictionModel, noise: ProcessNoise) -> PredictionModel:
         noise.unit * model.waves[0] * slow
     )
     return replace(
-        model,
-        G=np.hstack([model.G[:, : model.known], columns]),
-        R=_variances(model, noise.sensors),
+        model, G=np.hstack([model.G[:, : model.known], columns]), R=_variances(model, noise.sensors)
     )
 
 
@@ -413,11 +400,7 @@ def _depths(case: Case, T: float) -> dict[str, int]:
 
 
 def _present(
-    winch: SampledWinch,
-    shown: FloatArray,
-    sea_at: slice,
-    constants_at: slice,
-    size: int,
+    winch: SampledWinch, shown: FloatArray, sea_at: slice, constants_at: slice, size: int
 ) -> FloatArray:
     """Return the rows of what telemetry and reference unit take in."""
     rows = np.zeros((len(LATE), size))

@@ -132,11 +132,7 @@ class SampledWinch(ReadOnlyArrays):
     def off(self, **factors: float) -> SampledWinch:
         """Return the winch of the same case with factors on numbers of the plant."""
         return sampled_winch(
-            self.case,
-            sample_time=self.sample_time,
-            masses=self.masses,
-            drag=self.drag,
-            off=factors,
+            self.case, sample_time=self.sample_time, masses=self.masses, drag=self.drag, off=factors
         )
 
     @cached_property

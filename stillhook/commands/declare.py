@@ -58,10 +58,7 @@ def within(**limits: Any) -> Read:
 
 
 # Of options that several commands have.
-_USUAL: dict[str, Read] = {
-    "seed": within(low=0),
-    "starts": within(low=1, high=4096),
-}
+_USUAL: dict[str, Read] = {"seed": within(low=0), "starts": within(low=1, high=4096)}
 
 
 def options(text: str, **means: Read) -> Declaration:

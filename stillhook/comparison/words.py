@@ -14,18 +14,7 @@ from collections.abc import Sequence
 
 from models.basics import Interval, mean_interval
 
-from ..text import (
-    Column,
-    Table,
-    Written,
-    count,
-    duration,
-    listed,
-    number,
-    percent,
-    quantity,
-    scale,
-)
+from ..text import Column, Table, Written, count, duration, listed, number, percent, quantity, scale
 from .comparison import Comparison
 
 LEGEND = (

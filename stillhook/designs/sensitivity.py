@@ -154,10 +154,7 @@ def sensitivity_report(study: Sensitivity, moved: Sequence[Moved], wide: Wide | 
         indices = Drawing("indices", "Indices", lambda: indices_figure(studies, about))
         sections.append(ReportSection("", [_indices(wide), indices]))
     return Report(
-        name=study.design.case.name,
-        about=_about(study),
-        status=_finding(study),
-        sections=sections,
+        name=study.design.case.name, about=_about(study), status=_finding(study), sections=sections
     )
 
 

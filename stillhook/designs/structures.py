@@ -209,12 +209,7 @@ def _row(design: Design, names: Sequence[str], *, bound: bool) -> tuple[float | 
     )
 
 
-def _frame(
-    left: Axes,
-    right: Axes,
-    designs: Sequence[Design],
-    span: tuple[float, float],
-) -> None:
+def _frame(left: Axes, right: Axes, designs: Sequence[Design], span: tuple[float, float]) -> None:
     left.set_xscale("log")
     left.set_xlim(*span)
     left.set_yticks(range(len(designs)), [design.structure for design in designs])

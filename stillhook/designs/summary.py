@@ -44,10 +44,7 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     "motor.voltage.peak": ("motor voltage, peak", "winch.drive.voltage"),
     "motor.current.peak": ("motor current, peak", "winch.drive.current_peak"),
     "motor.current.continuous": ("motor current, continuous", "winch.drive.current_continuous"),
-    "motor.torque.breakdown": (
-        "motor torque, breakdown",
-        "winch.drive.torque_continuous",
-    ),
+    "motor.torque.breakdown": ("motor torque, breakdown", "winch.drive.torque_continuous"),
     "motor.power.peak": ("motor power, peak", "winch.drive.power"),
     "rope.tension.peak": ("rope tension, largest", "limits.rope_tension_peak"),
     "rope.tension.least": ("rope tension at drum, least", "limits.minimum_tension"),

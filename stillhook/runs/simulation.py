@@ -22,13 +22,7 @@ from models.operation import MotionSource, Scenario, SpectrumMotion, scenario_na
 from models.plant import MAX_MASSES, DriveLimits
 from models.run import Event, NamedQuantity, Run
 from models.sensing import Controller, holds_brake
-from models.simulation import (
-    Progress,
-    Simulation,
-    SimulationOptions,
-    prepare,
-    run_simulation,
-)
+from models.simulation import Progress, Simulation, SimulationOptions, prepare, run_simulation
 from synth.design import Design, Tuning
 
 from ..controllers import controller_of
@@ -51,11 +45,7 @@ class Series:
 
     @classmethod
     def prepare(
-        cls,
-        case: Case,
-        controller: Controller,
-        scenario: Scenario,
-        options: SimulationOptions,
+        cls, case: Case, controller: Controller, scenario: Scenario, options: SimulationOptions
     ) -> Series:
         """Prepare, the controller made for the scenario's own case (`Scenario.case_for`).
 
@@ -246,11 +236,7 @@ def simulate(
         case,
         # A lift in air is another case, with another static command, than the one given.
         controller_of(
-            controller,
-            scenario.case_for(case),
-            design=design,
-            gains=gains,
-            sample_time=sample_time,
+            controller, scenario.case_for(case), design=design, gains=gains, sample_time=sample_time
         ),
         scenario,
         SimulationOptions(

@@ -328,11 +328,7 @@ def _afloat(vessel: HullVessel) -> list[tuple[str, str, str]]:
         ),
         ("KB + BM", f"{buoyancy[2] + keel:.2f} + {plane.metacentric_radii[0]:.2f} m", ""),
         ("metacentric height, GM", f"{roll:.2f} m", f"of pitch {pitch:.0f} m"),
-        (
-            "radii of gyration",
-            ", ".join(f"{r:.2f}" for r in load.radii) + " m",
-            "roll, pitch, yaw",
-        ),
+        ("radii of gyration", ", ".join(f"{r:.2f}" for r in load.radii) + " m", "roll, pitch, yaw"),
     ]
 
 
@@ -369,10 +365,7 @@ def _about(vessel: HullVessel) -> list[tuple[str, str]]:
             f"{raos.omega.size} frequencies, {raos.omega[0]:.3g} to {raos.omega[-1]:.3g} rad/s, "
             f"{raos.heading.size} headings",
         ),
-        (
-            "panels",
-            f"{vessel.hull.count}" + (", kept from an earlier run" if vessel.kept else ""),
-        ),
+        ("panels", f"{vessel.hull.count}" + (", kept from an earlier run" if vessel.kept else "")),
         ("largest heave, roll, pitch", largest_motions(raos)),
     ]
     if math.isfinite(error):

@@ -72,9 +72,7 @@ def sweep_figures(result: xr.Dataset, design: Design | None = None) -> dict[str,
 
 @drawn
 def violins(
-    result: xr.Dataset,
-    design: Design | None = None,
-    names: Sequence[str] | None = None,
+    result: xr.Dataset, design: Design | None = None, names: Sequence[str] | None = None
 ) -> Figure:
     """Return how far each number spreads among the stable cases, over its nominal value.
 
@@ -122,10 +120,7 @@ def violins(
 
 @drawn
 def cumulative_share(
-    result: xr.Dataset,
-    name: str = "payload_rms",
-    *,
-    design: Design | None = None,
+    result: xr.Dataset, name: str = "payload_rms", *, design: Design | None = None
 ) -> Figure:
     """Return the share of all cases that stays below a value; unstable ones never do.
 

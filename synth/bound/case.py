@@ -50,23 +50,8 @@ from models.sensing import (
     sensed_spectra,
 )
 
-from ..limits import (
-    LOWER_TENSION,
-    Continuous,
-    Limit,
-    LowFrequency,
-    Minimum,
-    Peak,
-    Rms,
-    RollOff,
-)
-from ..loop import (
-    Assessment,
-    Disturbance,
-    LinearController,
-    Margins,
-    disturbances,
-)
+from ..limits import LOWER_TENSION, Continuous, Limit, LowFrequency, Minimum, Peak, Rms, RollOff
+from ..loop import Assessment, Disturbance, LinearController, Margins, disturbances
 from ..question import PAYLOAD, DesignQuestion, pose
 from ..structures import series
 from .bode_integral import BodeEstimate, bode_estimate
@@ -491,11 +476,7 @@ def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:
 
 
 def faint_noise(
-    case: Case,
-    plant: LinearPlant,
-    hook: HookMotion,
-    spectra: Mapping[str, Any],
-    faint: float,
+    case: Case, plant: LinearPlant, hook: HookMotion, spectra: Mapping[str, Any], faint: float
 ) -> tuple[LinearPlant, dict[str, Any], tuple[str, ...]]:
     """Return the plant and its spectra with a faint white noise where there is none.
 
@@ -539,11 +520,7 @@ def command_limit(case: Case, plant: LinearPlant) -> tuple[str, float]:
 
 
 def _terms(
-    question: DesignQuestion,
-    heard: Sequence[str],
-    drag: float,
-    faint: float,
-    friction: float = 0.0,
+    question: DesignQuestion, heard: Sequence[str], drag: float, faint: float, friction: float = 0.0
 ) -> _Terms:
     """Return the terms of a case, with its limits on signals as limits on their rms."""
     case, hook = question.case, question.hook

@@ -23,13 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.basics import (
-    ComplexArray,
-    FloatArray,
-    SynthesisError,
-    one_thread,
-    truncation_of_roots,
-)
+from models.basics import ComplexArray, FloatArray, SynthesisError, one_thread, truncation_of_roots
 
 from ..loop import LinearController, Margins, closed_loop_poles, loop_margins
 from .truth import controller_rms, densities, filter_plant, frequencies

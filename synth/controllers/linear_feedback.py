@@ -143,11 +143,7 @@ class LinearFeedback(RecursiveController):
 
     @classmethod
     def from_design(
-        cls,
-        design: Design | Tuning,
-        *,
-        case: Case | None = None,
-        **options: Any,
+        cls, design: Design | Tuning, *, case: Case | None = None, **options: Any
     ) -> LinearFeedback:
         """Return the feedback of a design.
 

@@ -11,13 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import (
-    ComplexArray,
-    FloatArray,
-    InputError,
-    Quadrature,
-    adaptive_nodes,
-)
+from models.basics import ComplexArray, FloatArray, InputError, Quadrature, adaptive_nodes
 from models.case import Case
 from models.hook import HookMotion
 

@@ -92,9 +92,7 @@ def pose_operability(
         own = _stationary(question, source.parameters)
     else:
         question, own, _ = on_enough_masses(
-            pose(reported, source.structure, built_for=source.built_for),
-            source.parameters,
-            _loop,
+            pose(reported, source.structure, built_for=source.built_for), source.parameters, _loop
         )
     of_case = case_criteria(reported, question.plant)
     every = (Stability(), *wanted, *of_case)

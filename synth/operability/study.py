@@ -22,13 +22,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtr
 
-from models.basics import (
-    InputError,
-    SolverError,
-    check_ascending,
-    check_range,
-    one_thread,
-)
+from models.basics import InputError, SolverError, check_ascending, check_range, one_thread
 from models.case import Case
 from models.sea import Scatter, read_scatter
 

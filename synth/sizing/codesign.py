@@ -171,11 +171,7 @@ def co_design(
     if not first.parameters:
         raise InputError(f"co-design: {first.status}")
     search = _Gears(
-        case=case,
-        structure=structure,
-        masses=first.masses,
-        begin=answer_of(first),
-        tell=tell,
+        case=case, structure=structure, masses=first.masses, begin=answer_of(first), tell=tell
     )
     given = search.cost(own, r0)
     r = r0 if radii is None else min(max(r0, radii[0]), radii[1])

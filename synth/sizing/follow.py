@@ -21,16 +21,7 @@ from ..design import Design, Tuning, design_of, tuning_of, verified
 from ..limits import drive_limits
 from ..loop import Assessment, Coefficients
 from ..question import PAYLOAD, DesignQuestion, Goal, Problem, pose
-from ..search import (
-    KEPT,
-    Found,
-    Progress,
-    Solution,
-    assess,
-    begin_points,
-    polish,
-    settle,
-)
+from ..search import KEPT, Found, Progress, Solution, assess, begin_points, polish, settle
 
 _FRESH = 3  # starts where no neighbour's answer is stable
 

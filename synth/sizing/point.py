@@ -252,13 +252,7 @@ def target_of(target: float | str, hook_rms: float) -> float:
 
 
 def highest_sea(
-    case: Case,
-    structure: str,
-    target: float | str,
-    *,
-    masses: int,
-    near: Answer,
-    tell: Progress,
+    case: Case, structure: str, target: float | str, *, masses: int, near: Answer, tell: Progress
 ) -> float:
     """Return the highest H_s in which the winch of a case meets a target [m]; 0 if none does.
 

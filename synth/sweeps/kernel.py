@@ -224,10 +224,7 @@ def hurwitz(columns: Columns) -> BoolArray:
             stable = stable & (lower[0] > 0.0)
             ratio = upper[0] / lower[0]
             padded = [*lower[1:], np.zeros(1)]
-            upper, lower = (
-                lower,
-                [u - ratio * p for u, p in zip(upper[1:], padded, strict=False)],
-            )
+            upper, lower = (lower, [u - ratio * p for u, p in zip(upper[1:], padded, strict=False)])
     return np.asarray(stable)
 
 

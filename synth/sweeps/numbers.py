@@ -61,14 +61,7 @@ NOISE_OF = {
     "payload.acceleration": ("acceleration_noise",),
     "payload.velocity": ("velocity_noise",),
     "payload.displacement": ("displacement_noise",),
-    "mru.heave": (
-        "mru_floor",
-        "mru_fraction",
-        "mru_gain",
-        "mru_phase",
-        "mru_drift",
-        "mru_noise",
-    ),
+    "mru.heave": ("mru_floor", "mru_fraction", "mru_gain", "mru_phase", "mru_drift", "mru_noise"),
     "rope.tension": ("cell_noise",),
 }
 """Numbers of the sensors by what is measured; zero or NaN where it is without noise."""

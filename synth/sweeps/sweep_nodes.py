@@ -143,9 +143,7 @@ def sweep_nodes(
         weights.append(own)
         sea.append(_product(axis, a, b, x, cuts, density) if cuts else own * density(at))
     return SweepNodes(
-        omega=np.concatenate(omega),
-        weights=_rules_of(weights, apart),
-        sea=_rules_of(sea, apart),
+        omega=np.concatenate(omega), weights=_rules_of(weights, apart), sea=_rules_of(sea, apart)
     )
 
 

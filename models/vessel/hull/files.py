@@ -32,11 +32,7 @@ _VERTEX = re.compile(
 
 
 def read_hull(
-    path: str | Path,
-    *,
-    scale: float = 1.0,
-    draught: float | None = None,
-    name: str | None = None,
+    path: str | Path, *, scale: float = 1.0, draught: float | None = None, name: str | None = None
 ) -> Hull:
     """Return the wetted surface of the hull in a mesh file.
 

@@ -246,11 +246,7 @@ def well_spaced(body: FloatingBody) -> FloatArray:
 
 
 def _provenance(
-    hull: Hull,
-    loading: Loading,
-    body: FloatingBody,
-    lid: bool,
-    command: str,
+    hull: Hull, loading: Loading, body: FloatingBody, lid: bool, command: str
 ) -> tuple[str, ...]:
     """Return what the numbers were made from, a sentence each."""
     inputs = ", ".join(f"{key} {_told(value)}" for key, value in hull.inputs.items())
@@ -280,10 +276,7 @@ def _told(value: object) -> str:
 
 
 def _warnings(
-    hull: Hull,
-    body: FloatingBody,
-    metacentric_height: float,
-    radii: Sequence[float | None],
+    hull: Hull, body: FloatingBody, metacentric_height: float, radii: Sequence[float | None]
 ) -> tuple[str, ...]:
     """Return what the figures should be taken with care for."""
     found = []

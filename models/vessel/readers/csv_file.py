@@ -245,11 +245,7 @@ def _convention(owner: str, told: Mapping[str, str], first: str, columns: Column
 
 
 def _values(
-    owner: str,
-    rows: FloatArray,
-    columns: Columns,
-    convention: Convention,
-    slope: FloatArray,
+    owner: str, rows: FloatArray, columns: Columns, convention: Convention, slope: FloatArray
 ) -> tuple[ComplexArray, list[str]]:
     """Return the operators of each row (n, 6), and the motions that have no columns."""
     table = np.zeros((len(rows), len(MODES)), dtype=np.complex128)

@@ -88,9 +88,7 @@ FORMATS: Mapping[str, Reader] = {
 }
 """The formats that are read."""
 
-_BUNDLED = {
-    "osv-83m": "offshore support vessel, 83 m, from our own hull lines by Capytaine",
-}
+_BUNDLED = {"osv-83m": "offshore support vessel, 83 m, from our own hull lines by Capytaine"}
 _HDF5 = b"\x89HDF"
 _LARGEST = 1e4  # m/m or rad/m: no vessel moves so
 

@@ -22,11 +22,7 @@ from ..convention import Convention
 from ..raos import VesselRaos
 
 SHIPX = Convention(
-    surge="aft",
-    sway="starboard",
-    roll="starboard up",
-    pitch="bow up",
-    heading_zero=180.0,
+    surge="aft", sway="starboard", roll="starboard up", pitch="bow up", heading_zero=180.0
 )
 """What the numbers of a `.re1` file mean."""
 

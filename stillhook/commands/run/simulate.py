@@ -248,10 +248,7 @@ def _question(asked: SimulationRequest, arguments: argparse.Namespace) -> dict[s
 
 
 def _show(
-    asked: SimulationRequest,
-    found: _Simulated,
-    folder: OutputFolder,
-    arguments: argparse.Namespace,
+    asked: SimulationRequest, found: _Simulated, folder: OutputFolder, arguments: argparse.Namespace
 ) -> None:
     out = console()
     report = runs_report([*found.compared.values()])

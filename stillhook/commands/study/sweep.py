@@ -166,11 +166,7 @@ def _swept(arguments: argparse.Namespace) -> Swept:
                 **options,
             )
     return Swept(
-        case=case,
-        design=design,
-        result=result,
-        folder=folder,
-        words=case_words(arguments),
+        case=case, design=design, result=result, folder=folder, words=case_words(arguments)
     )
 
 
@@ -193,11 +189,7 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
             arguments.resume, engine=arguments.cluster, jobs=arguments.jobs, progress=step
         )
     return Swept(
-        case=question.case,
-        design=None,
-        result=result,
-        folder=Path(arguments.resume),
-        words="",
+        case=question.case, design=None, result=result, folder=Path(arguments.resume), words=""
     )
 
 

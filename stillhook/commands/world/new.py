@@ -11,10 +11,7 @@ from ..declare import options
 from ..working import conclude
 
 FORCE = options("--force  overwrite the file if it exists")
-ARGUMENTS = (
-    options("file  the file to write"),
-    FORCE,
-)
+ARGUMENTS = (options("file  the file to write"), FORCE)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -11,10 +11,7 @@ from ..declare import options
 from ..working import conclude
 from .new import FORCE, written
 
-ARGUMENTS = (
-    options("[file]  the file to write (default: standard output)"),
-    FORCE,
-)
+ARGUMENTS = (options("[file]  the file to write (default: standard output)"), FORCE)
 
 
 def run(arguments: argparse.Namespace) -> int:
