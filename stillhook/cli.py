@@ -81,13 +81,9 @@ COMMANDS = (
 
 
 def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
-    """Return the parser of all commands.
+    """Return the parser of all commands, or with the arguments of the one that `words` name alone.
 
-    Parameters
-    ----------
-    words
-        What was typed: only the command that they name is imported for its arguments, so that
-        ``stillhook --help`` imports nothing; by default all are.
+    Only that command is imported, so that ``stillhook --help`` imports nothing.
     """
     from ._version import __version__
 
@@ -129,17 +125,9 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status.
+    """Run one command and return its exit status: 0, 1, 2, 3 or 130, see the module.
 
-    Parameters
-    ----------
-    argv
-        The arguments; by default those of the process.
-
-    Returns
-    -------
-    int
-        0, 1, 2, 3 or 130, see the module.
+    The arguments are those of the process by default.
 
     Raises
     ------

@@ -80,21 +80,10 @@ def read_text(path: str | Path) -> str:
 
 
 def replace_atomically(path: str | Path, write: Callable[[Path], object]) -> Path:
-    """Let `write` write a file under a temporary name beside it, then rename.
+    """Let `write` write a file under a temporary name beside it and close it, then rename.
 
     An interrupted run, or a full disk, leaves the old file or the new one, and nothing between.
-
-    Parameters
-    ----------
-    path
-        The file to write; its folder must exist.
-    write
-        Called once with the temporary path, which it has to write and close.
-
-    Returns
-    -------
-    Path
-        The file written.
+    The folder of the file must exist.
 
     Raises
     ------

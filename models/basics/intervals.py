@@ -138,18 +138,11 @@ def share(count: int, total: int, *, confidence: float = 0.95) -> Share:
 
 
 def fall_time(times: npt.ArrayLike, fell: npt.ArrayLike, *, confidence: float = 0.95) -> FallTime:
-    """Return how long runs keep lock, those that kept it to their end taken as censored.
+    """Return how long runs keep lock, from their times [s], those that kept it to the end censored.
 
     The interval of the rate is that of falls counted over a fixed exposure, from chi-square with
     2 r degrees of freedom at the low end and 2 r + 2 at the high one; without any fall the high
     end alone says something (three falls in the exposure, roughly).
-
-    Parameters
-    ----------
-    times
-        Time that each run kept lock [s]: until it fell, or until it ended.
-    fell
-        Whether it fell.
 
     Raises
     ------

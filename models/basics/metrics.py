@@ -64,21 +64,10 @@ def residual_text(residual: float, held: float = math.nan) -> str:
 def moments(
     quadrature: Quadrature, density: Density | npt.ArrayLike, orders: Sequence[float] = (0, 1, 2, 4)
 ) -> FloatArray:
-    """Return spectral moments, the integrals of omega^n S(omega).
+    """Return spectral moments, the integrals of omega^n S(omega) over the nodes, one an order.
 
-    Parameters
-    ----------
-    quadrature
-        Nodes and weights; the moments are those of the band that the nodes cover.
-    density
-        One-sided variance density [u^2 s/rad]: a function of omega, or its values at the nodes.
-    orders
-        The orders n.
-
-    Returns
-    -------
-    FloatArray
-        One moment per order [u^2 (rad/s)^n].
+    The one-sided variance density [u^2 s/rad] is a function of omega, or its values at the nodes;
+    the moments are [u^2 (rad/s)^n].
     """
     values = density(quadrature.omega) if callable(density) else density
     powers = quadrature.omega ** np.asarray(orders, dtype=np.float64)[:, np.newaxis]
@@ -109,13 +98,8 @@ def peak_factor(t_z: float, duration: float = THREE_HOURS) -> float:
 
     The formula is asymptotic in the number of crossings, T / T_z.  It is held at one sigma where
     that number is below :math:`e^{1/2}`: there is then no maximum worth the name, and no jump.
-
-    Parameters
-    ----------
-    t_z
-        Mean zero-crossing period [s], above zero; infinite for a signal at rest.
-    duration
-        Exposure time T [s], above zero.
+    Mean zero-crossing period T_z and exposure time T are above zero [s]; the period is infinite for
+    a signal at rest.
 
     Raises
     ------
@@ -179,14 +163,9 @@ def fractile_factor(t_z: float, probability: float, duration: float = THREE_HOUR
 
 
 def most_probable_maximum(sigma: float, t_z: float, duration: float = THREE_HOURS) -> float:
-    """Return the most probable maximum of a Gaussian signal [the unit of `sigma`].
+    """Return the most probable maximum of a Gaussian signal of deviation `sigma` [its unit].
 
-    Parameters
-    ----------
-    sigma
-        Standard deviation.
-    t_z, duration
-        As in :func:`peak_factor` [s].
+    Period and exposure time [s] are as in :func:`peak_factor`.
 
     Examples
     --------
@@ -200,12 +179,9 @@ def most_probable_maximum(sigma: float, t_z: float, duration: float = THREE_HOUR
 class SpectrumStatistics:
     """What a spectrum says about its signal, in the signal's unit u.
 
-    Attributes
-    ----------
-    m0, m1, m2, m4
-        Spectral moments over the spectrum's band [u^2 (rad/s)^n].  The m4 of a wave spectrum with
-        an omega^-5 tail grows with the logarithm of the band's upper end, so it means nothing
-        without it.
+    Its spectral moments are over the spectrum's band [u^2 (rad/s)^n].  The m4 of a wave spectrum
+    with an omega^-5 tail grows with the logarithm of the band's upper end, so it means nothing
+    without it.
     """
 
     m0: float

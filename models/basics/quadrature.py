@@ -60,14 +60,9 @@ class SpectralDensity(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Quadrature(ReadOnlyArrays):
-    """Nodes and weights of an integral over frequency.
+    """Nodes, ascending (k,) [rad/s], and positive weights (k,) [rad/s] of an integral.
 
-    Attributes
-    ----------
-    omega
-        Nodes, ascending (k,) [rad/s].
-    weights
-        Positive weights (k,) [rad/s], so that ``sum(weights * f(omega))`` is the integral of f.
+    That of f is ``sum(weights * f(omega))``.
     """
 
     omega: FloatArray
@@ -89,19 +84,7 @@ class Quadrature(ReadOnlyArrays):
         return int(self.omega.size)
 
     def integrate(self, values: npt.ArrayLike, axis: int = -1) -> FloatArray:
-        """Integrate values that were sampled at the nodes.
-
-        Parameters
-        ----------
-        values
-            Real samples; `axis` has the length of the nodes.
-        axis
-            The axis that runs over the nodes.
-
-        Returns
-        -------
-        FloatArray
-            `values` without that axis (a scalar for one-dimensional `values`).
+        """Integrate real values that were sampled at the nodes, which `axis` runs over, along it.
 
         Raises
         ------

@@ -45,12 +45,8 @@ def solve_riccati(
 ) -> Riccati:
     """Return the stabilising solution of the equation above; A + B gain is stable.
 
-    Parameters
-    ----------
-    A, B
-        Matrices, (n, n) and (n, m).
-    Q, R, S
-        Weights of x'Qx + 2 x'Su + u'Ru, (n, n), (m, m), (n, m); R is positive definite.
+    The weights of x'Qx + 2 x'Su + u'Ru are (n, n), (n, m), (m, m), R positive definite; A and B are
+    (n, n), (n, m).
 
     Raises
     ------
@@ -102,14 +98,9 @@ def solve_discrete_riccati(A: FloatArray, C: FloatArray, Q: FloatArray) -> Float
     .. math:: P = A P A' + Q - A P C' (C P C' + I)^{-1} C P A'
 
     Doubling squares the recursion at every step, so that some fifteen products of matrices do what
-    takes a generalised Schur form ten times as long; a tuning solves hundreds of them
-    (E. K.-W. Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Int. J. Control 77 (2004), 767-788).  The
-    regulator's equation is the filter's, transposed.
-
-    Parameters
-    ----------
-    A, C, Q
-        (n, n), (m, n), (n, n).
+    takes a generalised Schur form ten times as long; a tuning solves hundreds of them (E. K.-W.
+    Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Int. J. Control 77 (2004), 767-788).  The regulator's
+    equation is the filter's, transposed.  A, C and Q are (n, n), (m, n), (n, n).
 
     Raises
     ------
@@ -143,13 +134,7 @@ def solve_lyapunov(A: FloatArray, Q: FloatArray) -> FloatArray:
 
 
 def solve_discrete_lyapunov(A: FloatArray, Q: FloatArray) -> FloatArray | None:
-    """Return the X of X = A X A' + Q by doubling; None if A is not stable.
-
-    Parameters
-    ----------
-    A, Q
-        (n, n).
-    """
+    """Return the X of X = A X A' + Q, all (n, n), by doubling; None if A is not stable."""
     X = Q
     with np.errstate(all="ignore"):
         for _ in range(_DOUBLINGS):
@@ -168,17 +153,11 @@ def solve_discrete_lyapunov(A: FloatArray, Q: FloatArray) -> FloatArray | None:
 def balanced_truncation(
     heard: FloatArray, reached: FloatArray, order: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return projections, (order, n) and (n, order), on what two Gramians weigh most.
+    """Return projections, (order, n) and (n, order), on what two Gramians (n, n) weigh most.
 
     At most `order` states, fewer where the rest is of rounding size; the square-root method of
-    Tombs and Postlethwaite (Int. J. Control 46, 1987).
-
-    Parameters
-    ----------
-    heard, reached
-        Gramians of what the states do and of what drives them, (n, n).
-    order
-        Number of states to keep.
+    Tombs and Postlethwaite (Int. J. Control 46, 1987).  They are of what the states do (`heard`)
+    and of what drives them (`reached`).
     """
     roots = []
     for gramian in (heard, reached):

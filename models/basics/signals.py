@@ -15,18 +15,14 @@ from .checks import InputError, check_range
 
 @dataclass(frozen=True)
 class White:
-    """White noise of E[w(t) w(t+s)] = intensity * delta(s), as a spectrum.
+    """White noise of E[w(t) w(t+s)] = intensity * delta(s) as a spectrum.
 
     It disturbs sensors and drives shaping filters.  It has the same ``density`` as a sea or a
     hook's motion, but no finite variance and no band.
 
     Its one-sided density is intensity/pi per rad/s: twice the two-sided density
     intensity/(2 pi), so that a filter h has the output variance intensity * integral h(t)^2.
-
-    Parameters
-    ----------
-    intensity
-        [unit of w, squared, times s].
+    An intensity has the unit of w, squared, times s.
     """
 
     intensity: float = 1.0

@@ -154,19 +154,7 @@ def units_of(kind: str) -> tuple[str, ...]:
 
 
 def parse_quantity(value: object, kind: str) -> float:
-    """Read a number (SI already) or a text such as `44 mm` as a quantity of one kind.
-
-    Parameters
-    ----------
-    value
-        A number in the kind's SI unit, or a number and a unit as text.
-    kind
-        A key of `KINDS`: `length`, `mass`, `frequency` and so on.
-
-    Returns
-    -------
-    float
-        The value in SI.
+    """Read a number (SI already) or a text such as `44 mm` as a quantity of a kind of `KINDS`.
 
     Raises
     ------

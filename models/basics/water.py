@@ -27,19 +27,7 @@ def wave_frequency(number: npt.ArrayLike, depth: float = math.inf) -> FloatArray
 
 
 def wave_number(omega: npt.ArrayLike, depth: float = math.inf) -> FloatArray:
-    """Return the wave number.
-
-    Parameters
-    ----------
-    omega
-        Frequencies, at least zero, any shape [rad/s].
-    depth
-        Water depth, infinite if left out [m].
-
-    Returns
-    -------
-    FloatArray
-        Wave numbers, same shape [rad/m].
+    """Return wave numbers [rad/m] of frequencies [rad/s], at least zero, any shape, at a depth [m].
 
     Examples
     --------

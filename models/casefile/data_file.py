@@ -32,14 +32,9 @@ class DataFile:
     """What is wanted, with its article, as in `a RAO file or the name of a bundled vessel`."""
 
     def read(self, value: object, folder: Path | None) -> str:
-        """Return the name, or the absolute path.
+        """Return the name that stands in a field, or the absolute path.
 
-        Parameters
-        ----------
-        value
-            What stands in the field.
-        folder
-            Folder that a relative path starts from; the working directory if None.
+        A relative one starts from the folder, or from the working directory if that is None.
         """
         if not isinstance(value, str | Path) or not str(value).strip():
             raise InputError(f"must be the path of {self.what}, got {value!r:.60}")

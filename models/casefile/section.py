@@ -59,13 +59,9 @@ class Section(BaseModel):
 
 
 def problems(*found: tuple[str, str]) -> PydanticCustomError:
-    """Return the error that a section's own check raises.
+    """Return the error that a section's own check raises, of pairs of a field and a sentence.
 
-    Parameters
-    ----------
-    *found
-        Pairs of a field's name in the section (dotted for deeper ones, empty for the section
-        itself) and the sentence about it.
+    Names are those in the section, dotted for deeper ones, empty for the section itself.
     """
     message = "; ".join(text for _, text in found)
     return PydanticCustomError("stillhook", "{message}", {"message": message, "problems": found})

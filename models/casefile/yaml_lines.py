@@ -27,21 +27,9 @@ _MOST = 100_000
 
 
 def read_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
-    """Return the contents of a YAML text, and the line of each path.
+    """Return the contents of a YAML text, None if it holds nothing, and each path's line, from 1.
 
-    Parameters
-    ----------
-    text
-        The file's text.
-    source
-        Its name, for the messages.
-
-    Returns
-    -------
-    data
-        Dicts, lists, texts and numbers; None if the text holds nothing.
-    lines
-        Line by path, counted from 1.
+    Messages call the text by its source.
 
     Raises
     ------
@@ -81,15 +69,7 @@ def read_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
 def yaml_text(data: Mapping[str, Any]) -> str:
     """Return plain data as YAML: sections as blocks, lists of numbers on one line.
 
-    Parameters
-    ----------
-    data
-        Dicts, lists, texts and numbers.
-
-    Returns
-    -------
-    str
-        Text from which `read_yaml` gives the same data, to the last digit.
+    From it `read_yaml` gives the same data, to the last digit.
     """
     writer = YAML(typ="rt", pure=True)
     writer.width = 100

@@ -46,15 +46,7 @@ _NOTHING = 1e-9
 
 
 def speed_along(case: Case, headings: npt.ArrayLike) -> FloatArray:
-    """Return how fast the vessel moves through the water along waves of some headings [m/s].
-
-    Parameters
-    ----------
-    case
-        Its `vessel.speed` and `vessel.current`.
-    headings
-        Where the waves travel to [rad].
-    """
+    """Return how fast the vessel moves through the water along waves of headings [rad], [m/s]."""
     angle = np.asarray(headings, dtype=np.float64)
     found = (case.vessel.speed or 0.0) * np.cos(angle)
     current = case.vessel.current
@@ -89,13 +81,7 @@ class Encounter(ReadOnlyArrays):
     def from_case(cls, case: Case, *, hook: bool = True) -> Encounter | None:
         """Return how a case's vessel meets the waves; None if it lies still in the water.
 
-        Parameters
-        ----------
-        case
-            The case.
-        hook
-            Whether to bring the hook's operators along; without them it is for other motions in
-            the same waves.
+        Without its hook's operators it is for other motions in the same waves.
         """
         if not case.vessel.moves:
             return None
@@ -116,17 +102,9 @@ class Encounter(ReadOnlyArrays):
         )
 
     def frequency(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the frequencies of encounter, negative for waves that are overtaken.
+        """Return the frequencies of encounter (n, k) by heading and wave frequency (k,) [rad/s].
 
-        Parameters
-        ----------
-        omega
-            Frequencies of the waves (k,) [rad/s].
-
-        Returns
-        -------
-        FloatArray
-            omega_e by heading and frequency (n, k) [rad/s].
+        They are negative for waves that are overtaken.
         """
         wave = np.asarray(omega, dtype=np.float64)
         met: FloatArray = wave - np.multiply.outer(self.along, wave_number(wave, self.depth))

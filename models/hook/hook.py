@@ -108,15 +108,9 @@ class HookMotion:
 
     @classmethod
     def from_case(cls, case: Case, *, warn: bool = True) -> HookMotion:
-        """Return the hook motion of a case.
+        """Return the hook motion of a case; warn if much of it lies outside the RAO's table.
 
-        Parameters
-        ----------
-        case
-            The case.
-        warn
-            Whether to warn if much of the motion lies outside the RAO's table; not where the
-            case's user has been told before, and never of a quiet case (`Case.variant`).
+        Not where the case's user has been told before, and never of a quiet case (`Case.variant`).
         """
         sea = case.sea.to_spectrum()
         motion = cls(
@@ -296,11 +290,8 @@ class HookMotion:
 def motion_statistics(moments: FloatArray) -> tuple[SpectrumStatistics, ...]:
     """Return the statistics of displacement, velocity and acceleration.
 
-    Parameters
-    ----------
-    moments
-        Moments of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n]: those of a derivative
-        are two orders further on.
+    The moments are those of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n]: those of a
+    derivative are two orders further on.
     """
     m = [float(moment) for moment in moments]
     return tuple(

@@ -80,13 +80,7 @@ class HookSurvey(ReadOnlyArrays):
     own: HookDemand
 
     def rms(self, motion: str = "velocity") -> FloatArray:
-        """Return standard deviations (s, h, t) [m, m/s or m/s2].
-
-        Parameters
-        ----------
-        motion
-            `displacement`, `velocity` or `acceleration`.
-        """
+        """Return deviations (s, h, t) of `displacement`, `velocity` or `acceleration` [SI]."""
         check_choice("hook", "motion", motion, _MOTIONS)
         return np.sqrt(np.maximum(self.moments[..., 2 * _MOTIONS.index(motion)], 0.0))
 

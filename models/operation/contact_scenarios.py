@@ -210,14 +210,8 @@ def boat_motion(case: Case, cut_off: float = 0.9) -> SpectrumMotion:
 
     An illustrative small boat: it follows waves that are long against it and not those that are
     short, |RAO| = 1/sqrt(1 + (omega/omega_c)^8).  Its waves have the spectrum of the case but are
-    drawn by themselves: how far it lies from the vessel is not known.
-
-    Parameters
-    ----------
-    case
-        Its sea.
-    cut_off
-        omega_c [rad/s]; 0.9 rad/s is a wave of 76 m, the length of a supply boat.
+    drawn by themselves: how far it lies from the vessel is not known.  The cut-off omega_c [rad/s]
+    of 0.9 is that of a wave of 76 m, the length of a supply boat.
     """
     omega = np.linspace(0.1, 4.0, 40) * cut_off
     amplitude = 1.0 / np.sqrt(1.0 + (omega / cut_off) ** 8)
@@ -226,19 +220,12 @@ def boat_motion(case: Case, cut_off: float = 0.9) -> SpectrumMotion:
 
 
 def surface_motion(case: Case, side: float) -> SpectrumMotion:
-    """Return the water's surface under the hook, averaged over the payload's plan.
+    """Return the water's surface under the hook, averaged over the payload's plan, `side` long [m].
 
     Its waves are those that move the hook, whose RAO refers to the wave at the hook.  Long-crested
     waves of wave number k over a side a average to sin(ka/2)/(ka/2); from the first zero on there
     is nothing left of them.  A hook whose RAO has no phases follows the surface without a lag: a
     warning says so, as nothing else in the toolkit asks for both motions in the same waves.
-
-    Parameters
-    ----------
-    case
-        Its sea.
-    side
-        Side a of the payload's plan along the waves [m].
     """
     table = case.vessel.heave_rao
     if table is not None and table.phase is None and not case.quiet:

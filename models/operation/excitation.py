@@ -55,12 +55,7 @@ _LATER_PIECE = 6
 def seed_for(seed: int, *purpose: int) -> int:
     """Return the seed for one purpose of a run, independent of those for all others.
 
-    Parameters
-    ----------
-    seed
-        Seed of the run.
-    *purpose
-        Numbers above zero: numpy fills short seeds up with zeros.
+    A purpose is numbers above zero: numpy fills short seeds up with zeros.
     """
     return int(np.random.SeedSequence([seed, *purpose]).generate_state(1, np.uint64)[0])
 
@@ -174,17 +169,7 @@ class Motion:
         return math.floor(self.duration / self.step * (1.0 + 1e-12) + 1e-9) + 1
 
     def block(self, start: int, count: int) -> MotionBlock:
-        """Return rows, the same whatever was read before.
-
-        Parameters
-        ----------
-        start, count
-            The first row, from 0, and their number.
-
-        Returns
-        -------
-        MotionBlock
-            Displacement [m], velocity [m/s] and acceleration [m/s2], each (count,).
+        """Return so many rows (count,) [SI] from one on, the same whatever was read before.
 
         Raises
         ------
@@ -268,15 +253,9 @@ class SpectrumMotion:
     """A random motion drawn from a spectrum: the hook's in a sea, or another body's.
 
     Up to three hours and ten minutes it is `HookMotion.record` of the same duration and seed,
-    interpolated to 1e-7 m; beyond that `LongRecord` joins records of an hour.
-
-    Attributes
-    ----------
-    hook
-        The spectrum.
-    purpose
-        None to draw with the run's own seed: bodies with the same purpose in the same sea meet
-        the same waves.  `SECOND_BODY` and `SURFACE` draw waves of their own.
+    interpolated to 1e-7 m; beyond that `LongRecord` joins records of an hour.  Without a `purpose`
+    it is drawn with the run's own seed: bodies with the same purpose in the same sea meet the same
+    waves.  `SECOND_BODY` and `SURFACE` draw waves of their own.
     """
 
     hook: HookMotion

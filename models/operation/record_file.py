@@ -224,14 +224,7 @@ class RecordMotion:
 
 
 def even_step(owner: str, time: FloatArray) -> float:
-    """Return the time step of a record [s].
-
-    Parameters
-    ----------
-    owner
-        Whose times they are, for the message.
-    time
-        Times (n,) [s]; rounded ones, as in most files, are even enough.
+    """Return the time step of a record [s], of times (n,) [s]; rounded ones, as in files, will do.
 
     Raises
     ------

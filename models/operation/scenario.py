@@ -175,21 +175,12 @@ class Scenario:
         return tuple(sorted(found))
 
     def initial_displacements(self, compliances: npt.ArrayLike) -> FloatArray:
-        """Return where the rope's masses and the payload are at rest at the start.
+        """Return where rope masses and payload are at rest at first, from the drum down [m].
 
         The payload is at P = 0.  The masses above it have moved with the drum, and by what the
-        rope's tension differs from that of the submerged payload, `Surroundings.rest_force` F:
-        x_j = initial_haul + F times the compliance of the springs above mass j.
-
-        Parameters
-        ----------
-        compliances
-            Of each spring, from the drum down (n,) [m/N].
-
-        Returns
-        -------
-        FloatArray
-            From the drum down, the payload's last (n,) [m].
+        rope's tension differs from that of the submerged payload, `Surroundings.rest_force` F: x_j
+        = initial_haul + F times the compliance of the springs above mass j.  The compliances are of
+        each spring, likewise (n,) [m/N].
         """
         force = self.surroundings.rest_force if self.surroundings is not None else 0.0
         above = np.cumsum(np.asarray(compliances, dtype=np.float64))

@@ -43,17 +43,10 @@ class ScheduleBlock:
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
-    """A scenario at a sample time.
+    """A scenario at a sample time [s].
 
     A planned disengagement ramps the command out and then sets the brake; a brake trip does both
     at once, and when it ends the controller is ramped in again.
-
-    Attributes
-    ----------
-    scenario
-        What is asked.
-    sample_time
-        Time from row to row [s].
     """
 
     scenario: Scenario

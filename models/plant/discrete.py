@@ -13,18 +13,11 @@ from ..basics import FloatArray
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-    """Return (exp(A dt), integral of exp(A t) dt B over one sample).
+    """Return (exp(A dt), integral of exp(A t) dt B over one sample of dt [s]), A (n, n), B (n, m).
 
     By one matrix exponential of the augmented matrix, C. Van Loan, "Computing integrals
     involving the matrix exponential", IEEE TAC 23 (1978), so that a singular A (a drum that
     integrates) needs no special case.
-
-    Parameters
-    ----------
-    A, B
-        Continuous matrices, (n, n) and (n, m).
-    dt
-        Sample time [s].
     """
     n, m = B.shape
     augmented = np.zeros((n + m, n + m))
@@ -70,14 +63,9 @@ def hermite_hold(
 
 
 def noisy_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-    """Return (exp(A dt), covariance of what white noise of intensity one adds over a sample).
+    """Return (exp(A dt), covariance of what white noise of intensity one adds over dt [s]).
 
-    Parameters
-    ----------
-    A, B
-        x' = A x + B n, (n, n), (n, m).
-    dt
-        Sample time [s].
+    It is that of x' = A x + B n, (n, n), (n, m).
     """
     n = len(A)
     block = np.zeros((2 * n, 2 * n))

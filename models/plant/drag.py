@@ -21,17 +21,10 @@ _SETTLED = 1e-3  # relative change of a drag for which adapted nodes need not ch
 
 
 def stochastic_equivalent(quadratic: float, sigma: float) -> float:
-    """Return the C of stochastic linearisation, q sqrt(8/pi) sigma [N s/m].
+    """Return the C of stochastic linearisation, q sqrt(8/pi) sigma [N s/m], of q [N s2/m2].
 
-    The mean slope of q v|v|, v Gaussian, which is also its least-mean-square gain (Price's
-    theorem; Borgman, J. Waterways Harbors 93, 1967).
-
-    Parameters
-    ----------
-    quadratic
-        q [N s2/m2].
-    sigma
-        Standard deviation of the payload's velocity [m/s].
+    The mean slope of q v|v|, v Gaussian, which is also its least-mean-square gain (Price's theorem;
+    Borgman, J. Waterways Harbors 93, 1967).  The velocity's standard deviation sigma is [m/s].
     """
     return quadratic * math.sqrt(8.0 / math.pi) * sigma
 

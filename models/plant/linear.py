@@ -553,14 +553,9 @@ class LinearPlant(ReadOnlyArrays):
 
 
 def late_and_held(s: ComplexArray, delays: Sequence[float], holds: Sequence[float]) -> ComplexArray:
-    """Return what delays, half the holds in them, and holds make of signals, (k, ny).
+    """Return what delays, half the holds in them, and holds make of signals at points (k, 1) [1/s].
 
-    Parameters
-    ----------
-    s
-        Points [1/s], (k, 1).
-    delays, holds
-        As of a `LinearPlant`, (ny,) [s].
+    It is (k, ny); delays and holds are as of a `LinearPlant`, (ny,) [s].
     """
     late, T = np.array(delays), np.array(holds)
     factor = np.asarray(np.exp(-s * (late - 0.5 * T)), dtype=np.complex128)

@@ -20,22 +20,12 @@ def pade_state_space(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return (A, B, C, D) of the [order/order] Pade approximant of exp(-s delay).
 
-    The denominator's roots are found at unit delay and scaled, and every pair becomes one
-    section (s^2 - b s + c)/(s^2 + b s + c) = 1 - 2 b s/(s^2 + b s + c).  The companion form
-    of the same polynomial has entries that differ by delay^order and spoils eigenvalues.
-
-    Parameters
-    ----------
-    delay
-        The delay [s], above zero.
-    order
-        Order of the approximant, 1 to 12.  The phase error at omega is about
-        (omega delay)^(2 order + 1) (order! / (2 order)!)^2 / (2 order + 1) [rad].
-
-    Returns
-    -------
-    tuple of arrays
-        A (order, order), B (order, 1), C (1, order), D (1, 1).
+    The denominator's roots are found at unit delay and scaled, and every pair becomes one section
+    (s^2 - b s + c)/(s^2 + b s + c) = 1 - 2 b s/(s^2 + b s + c).  The companion form of the same
+    polynomial has entries that differ by delay^order and spoils eigenvalues.  A (order, order), B
+    (order, 1), C (1, order), D (1, 1), for a delay above zero [s] and an order from 1 to 12.  The
+    phase error at omega is about (omega delay)^(2 order + 1) (order! / (2 order)!)^2 / (2 order +
+    1) [rad].
     """
     coefficients = [
         math.factorial(2 * order - k)
@@ -76,19 +66,9 @@ def pade_state_space(
 def pade_bank(
     delays: Sequence[float], order: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the block-diagonal Pade model of several channels; a zero delay is a wire.
+    """Return (A, B, C, D) of the block-diagonal Pade model of several channels, of delays [s].
 
-    Parameters
-    ----------
-    delays
-        Delay of each channel [s], zero or more.
-    order
-        Order of each approximant, 1 to 12.
-
-    Returns
-    -------
-    tuple of arrays
-        A, B, C, D with `order` states for each delay above zero.
+    Each delay above zero has `order` states, 1 to 12; a zero delay is a wire.
     """
     late = [i for i, delay in enumerate(delays) if delay > 0.0]
     n, m = order * len(late), len(delays)

@@ -23,13 +23,8 @@ if TYPE_CHECKING:
 class DrumTravel:
     """Where, seen from the static position, the rope's layer on the drum changes.
 
-    Parameters
-    ----------
-    outward
-        (haul at which it happens [m], radius from there on [m]) for hauling in, ascending.
-    inward
-        (haul paid out at which it happens, as a positive number [m], radius from there on [m])
-        for paying out, ascending.
+    Each pair of `inward` and `outward` is where that happens, as a positive number of haul in or
+    paid out, ascending [m], and the radius from there on [m].
     """
 
     outward: tuple[tuple[float, float], ...] = ()

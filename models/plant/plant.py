@@ -190,18 +190,11 @@ class Plant(Equations):
 
         The command's own delay is in those of the measurements: the loop is the same.
 
-        Derivatives are automatic.  Gear and sheaves have the mean of their two factors,
-        (1/eta + eta)/2, and ``static`` is rest with it; ``loss`` is what hauling takes above that,
-        and dry friction.
-        Where the losses do not switch (`PlantData.switching`) ``static`` is rest with the motor
-        hauling and there is no ``loss``.
-
-        Parameters
-        ----------
-        drag
-            Equivalent linear drag coefficient C of the payload [N s/m].
-        parameters
-            Other parameters to change by name.
+        Derivatives are automatic.  Gear and sheaves have the mean of their two factors, (1/eta +
+        eta)/2, and ``static`` is rest with it; ``loss`` is what hauling takes above that, and dry
+        friction.  Where the losses do not switch (`PlantData.switching`) ``static`` is rest with
+        the motor hauling and there is no ``loss``.  The payload's equivalent linear drag
+        coefficient is C [N s/m]; `parameters` changes others by name.
 
         Raises
         ------

@@ -427,20 +427,12 @@ def as_plant_data(source: Case | PlantData) -> PlantData:
 
 
 def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
-    """Return the fewest masses that hold every axial mode below `omega_max`.
+    """Return the fewest masses that hold every axial mode below `omega_max` [rad/s].
 
     The rule: each exact mode (upper end held) below `omega_max` has its counterpart of the
     same number in the lumped rope within 5 % of its frequency.  At least two masses, as one
     has no second mode even to miss; a ``thesis`` lumping with its number of masses given is
     left as it is.
-
-    Parameters
-    ----------
-    data
-        The plant's numbers.
-    omega_max
-        Highest frequency [rad/s] at which the rope matters, five times the crossover of
-        the loop in a design.
 
     Raises
     ------

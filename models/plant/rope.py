@@ -42,15 +42,9 @@ _EXACT = 1e3  # weight of the first mode, whose ratio is the one that is given
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RopeLumps(ReadOnlyArrays):
-    """Lengths of rope that the springs and the masses stand for, from the drum down.
+    """Lengths of rope that springs and masses stand for, from the drum down, over its own [-].
 
-    Parameters
-    ----------
-    springs
-        Length of rope in each spring, (N,), as a fraction of the rope [-]; they add to 1.
-    masses
-        Length of rope in each mass, (N,), as a fraction of the rope [-], the last being
-        the payload's share.
+    Those of the springs (N,) add to 1; the last of the masses (N,) is the payload's share.
     """
 
     springs: FloatArray
@@ -302,12 +296,7 @@ def skin_drag_share(eps: FloatArray) -> FloatArray:
         tan(nu/2) (2 + cos nu) / (6 nu cos^2(nu/2)),
 
     which is a quarter for a light rope.  Stochastic linearisation keeps it, as all velocities of a
-    mode are in proportion.
-
-    Parameters
-    ----------
-    eps
-        Mass of the rope over that of the load, (n,).
+    mode are in proportion.  `eps` is the mass of the rope over that of the load, (n,).
     """
     nu = np.maximum(first_root(np.maximum(eps, 0.0)), 1e-9)
     half = 0.5 * nu

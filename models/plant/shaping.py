@@ -172,14 +172,9 @@ def sampled_density(
 def controllable_form(
     poles: FloatArray, zeros: FloatArray, origin: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return A, B, C of s^origin times sections of zeros over sections of poles.
+    """Return A, B, C of s^origin times sections of zeros over sections of poles, second-order each.
 
-    Parameters
-    ----------
-    poles, zeros
-        Frequency [rad/s] and damping ratio of each second-order section, (., 2).
-    origin
-        Zeros at the origin.
+    A section has a frequency [rad/s] and a damping ratio, (., 2).
     """
     below, above = np.ones(1), np.ones(1)
     for at, damping in poles:

@@ -56,14 +56,9 @@ _HARDEST_LANDING = 2.0  # [m/s]
 
 @dataclass(frozen=True, kw_only=True)
 class Ground:
-    """What the payload may touch.
+    """What the payload may touch, at a height `below` its underside at the start [m].
 
-    Attributes
-    ----------
-    below
-        Height of the payload's underside above it at the start [m].
-    stiffness, damping
-        k [N/m] and b [N s/m^1.5] of the contact force.
+    The contact force has k [N/m] and b [N s/m^1.5].
     """
 
     name: ClassVar[str]

@@ -191,20 +191,11 @@ def extreme_over_seeds(
 
 
 def gumbel_fit(maxima: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    r"""Return location and scale of Gumbel's law by maximum likelihood, for many samples at once.
+    r"""Return location and scale of Gumbel's law by maximum likelihood, (...,), of (..., n).
 
     The scale solves :math:`\beta = \bar x - \sum x e^{-x/\beta} / \sum e^{-x/\beta}`; Newton's
-    method from the moments' estimate converges for every sample.
-
-    Parameters
-    ----------
-    maxima
-        Samples (..., n), each along the last axis, not all equal.
-
-    Returns
-    -------
-    tuple of FloatArray
-        Locations and scales (...,).
+    method from the moments' estimate converges for every sample.  No sample has all its values
+    equal.
     """
     x = np.asarray(maxima, dtype=np.float64)
     mean = x.mean(axis=-1, keepdims=True)

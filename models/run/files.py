@@ -66,18 +66,7 @@ def attributes(run: Run) -> dict[str, str | int | float]:
 
 
 def to_xarray(run: Run) -> xarray.Dataset:
-    """Return the signals of a run as a data set over `time`.
-
-    Parameters
-    ----------
-    run
-        The run.
-
-    Returns
-    -------
-    xarray.Dataset
-        A variable (time,) for each signal, with attribute `units`; :func:`attributes` as its own.
-    """
+    """Return the signals of a run over `time` (time,), each with its `units`, and `attributes`."""
     import xarray
 
     return xarray.Dataset(

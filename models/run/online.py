@@ -25,13 +25,7 @@ _CYCLES_AT_ONCE = 1024
 
 
 class Moments:
-    """Mean, variance, smallest and largest value of several signals, and when they came.
-
-    Parameters
-    ----------
-    count
-        Number of signals.
-    """
+    """Mean, variance, smallest and largest value of several signals, and when they came."""
 
     def __init__(self, count: int) -> None:
         self.samples = 0
@@ -72,13 +66,6 @@ class Cycles:
 
     Crest and trough of every cycle are kept in single precision, up to `capacity` cycles; beyond
     that the store is given up and only the largest are known.
-
-    Parameters
-    ----------
-    level
-        The level crossed.
-    capacity
-        Largest number of cycles stored.
     """
 
     def __init__(self, level: float, capacity: int) -> None:
@@ -189,14 +176,9 @@ class Cycles:
 
 
 class Slack:
-    """A rope's time without tension, and the snap when it comes tight again.
+    """A rope's time with a least tension at or below a limit [N], and the snap when it comes tight.
 
-    Parameters
-    ----------
-    limit
-        At or below this smallest tension the rope counts as slack [N].
-    window
-        Number of samples after slack in which a snap is looked for.
+    A snap is looked for over `window` samples after slack.
     """
 
     def __init__(self, limit: float, window: int) -> None:
@@ -260,15 +242,7 @@ class Touchdown:
 
 
 class BlockExtremes:
-    """Largest and smallest value of several signals in each whole block of a run.
-
-    Parameters
-    ----------
-    signals
-        Number of signals.
-    length
-        Number of samples in a block.
-    """
+    """Largest and smallest value of several signals in each whole block of `length` samples."""
 
     def __init__(self, signals: int, length: int) -> None:
         self.length = length

@@ -68,14 +68,7 @@ _MOST_VALUES = 3e8  # densities of one file: 2.4 GB
 
 
 def read_with_library(path: str, name: str) -> RawRecords:
-    """Read a file of one format.
-
-    Parameters
-    ----------
-    path
-        The file.
-    name
-        A name of :data:`FORMATS`, or `netcdf` to find out which one it is.
+    """Read a file of one format of :data:`FORMATS`, or `netcdf` to find out which one it is.
 
     Raises
     ------

@@ -108,24 +108,10 @@ class QualityControl:
 def sift(
     omega: FloatArray, density: FloatArray, names: Sequence[str], same: Sequence[object]
 ) -> tuple[npt.NDArray[np.bool_], list[Rejection]]:
-    """Tell which records are spectra.
+    """Tell which records are spectra (n,), and why the others are not.
 
-    Parameters
-    ----------
-    omega
-        Frequencies (k,) [rad/s].
-    density
-        Densities (n, k) [m^2 s/rad], NaN where a value is missing.
-    names
-        What to call each record (n,): its line or its time.
-    same
-        Time and place of each record (n,): the second with the same is a repetition; None is
-        never one.
-
-    Returns
-    -------
-    keep, rejections
-        Which records are kept (n,), and why the others are not.
+    Densities (n, k) [m^2 s/rad] are NaN where a value is missing.  A record's name is its line or
+    its time; the second with the `same` time and place is a repetition, and None is never one.
     """
     count = len(names)
     open_, found = np.ones(count, dtype=np.bool_), []

@@ -185,14 +185,9 @@ class SeaRecords:
         return np.asarray(2.0 * math.pi * np.sqrt(m0 / m2))
 
     def sea(self, record: int, *, beyond: str = "decay") -> SeaSpectrum:
-        """Return one record as a sea.
+        """Return one record as a sea, counted from 0 in the order of time.
 
-        Parameters
-        ----------
-        record
-            Which, counted from 0 in the order of time.
-        beyond
-            What is above the last frequency: `decay`, falling as omega^-5, or `zero`.
+        Above the last frequency it may `decay`, falling as omega^-5, or be `zero`.
 
         Raises
         ------
@@ -211,15 +206,11 @@ class SeaRecords:
         period_step: float | None = 1.0,
         vessel_heading: float | None = None,
     ) -> Scatter:
-        """Return the scatter diagram of the records.
+        """Return the scatter diagram of the records on classes of such widths [m], [s].
 
-        Parameters
-        ----------
-        height_step, period_step
-            Widths of the classes [m], [s]; None keeps every record as a state of its own.
-        vessel_heading
-            Compass heading of a vessel's bow, clockwise from north [rad].  Where it is given, each
-            state has the direction that its waves travel towards, counter-clockwise from the bow.
+        Where a width is None every record is a state of its own.  Where the compass heading of a
+        vessel's bow is given, clockwise from north [rad], each state has the direction that its
+        waves travel towards, counter-clockwise from the bow.
 
         Raises
         ------
@@ -248,19 +239,10 @@ class SeaRecords:
 
 
 def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords:
-    """Read the spectra of a file, behind quality control.
+    """Read the spectra of a file, plain or packed with gzip, behind quality control.
 
-    Parameters
-    ----------
-    path
-        The file, plain or packed with gzip.
-    file_format
-        Name of its format, one of `models.sea.library_files.FORMATS`; found out if left out.
-
-    Returns
-    -------
-    SeaRecords
-        The records that are spectra, in the order of time, and the account of the rest.
+    They come in the order of time, with the account of the rest.  The format is one of
+    `models.sea.library_files.FORMATS`; it is found out if left out.
 
     Raises
     ------

@@ -114,14 +114,10 @@ class Scatter:
         return float(self.occurrence[self.significant_height <= significant_height].sum())
 
     def binned(self, *, height_step: float = 0.5, period_step: float = 1.0) -> Scatter:
-        """Return the diagram on classes of H_s and T_p, each state at the centre of its class.
+        """Return the diagram on classes of H_s [m] and T_p [s], each state at its class's centre.
 
-        Months and headings stay apart where there are months; headings fall into 30 degrees.
-
-        Parameters
-        ----------
-        height_step, period_step
-            Widths of the classes [m], [s], the first beginning at zero.
+        Months and headings stay apart where there are months; headings fall into 30 degrees.  The
+        first classes begin at zero.
         """
         check_range(self.source, "height_step", height_step, low=0.0, unit="m", open_low=True)
         check_range(self.source, "period_step", period_step, low=0.0, unit="s", open_low=True)
@@ -191,17 +187,9 @@ class Scatter:
     def matrix(
         self, height_step: float = 0.5, period_step: float = 1.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the diagram as a matrix over all months and headings.
+        """Return the diagram as a matrix of shares (r, c) [-] over all months and headings.
 
-        Parameters
-        ----------
-        height_step, period_step
-            Widths of the classes [m], [s].
-
-        Returns
-        -------
-        heights, periods, occurrence
-            Edges of the classes (r + 1,) [m] and (c + 1,) [s], and the shares (r, c) [-].
+        Before it come the edges of the classes of such widths, (r + 1,) [m] and (c + 1,) [s].
         """
         rows = math.floor(float(self.significant_height.max()) / height_step) + 1
         first = math.floor(float(self.peak_period.min()) / period_step)

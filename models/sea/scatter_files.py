@@ -55,15 +55,9 @@ def read_scatter(path: str | Path, *, gamma: float = 1.0) -> Scatter:
         1-2, 14, 402, 516
 
     Separators are commas, semicolons (then with decimal commas, if the file has them) or tabs;
-    lines that begin with `#` are passed over.
-
-    Parameters
-    ----------
-    path
-        The file.
-    gamma
-        Peak enhancement of the JONSWAP spectrum by which zero-crossing periods become peak
-        periods [-]; 1 is Pierson-Moskowitz's, which published diagrams of T_z assume.
+    lines that begin with `#` are passed over.  Zero-crossing periods become peak periods by a
+    JONSWAP spectrum of `gamma` [-]; 1 is Pierson-Moskowitz's, which published diagrams of T_z
+    assume.
 
     Raises
     ------
@@ -104,12 +98,7 @@ def write_scatter(path: str | Path, scatter: Scatter) -> Path:
 
 
 def zero_crossing_ratio(gamma: float) -> float:
-    """Return T_z / T_p of a JONSWAP spectrum (DNV-RP-C205, 3.5.5.5).
-
-    Parameters
-    ----------
-    gamma
-        Peak enhancement, 1 to 7 [-].
+    """Return T_z / T_p of a JONSWAP spectrum of gamma 1 to 7 [-] (DNV-RP-C205, 3.5.5.5).
 
     Examples
     --------

@@ -164,31 +164,15 @@ class SeaSpectrum:
     def from_table(
         cls, omega: npt.ArrayLike, density: npt.ArrayLike, *, beyond: str = "decay"
     ) -> SeaSpectrum:
-        """Return a measured sea; :meth:`scaled` gives it another height.
+        """Return a measured sea, (k,) [rad/s], (k,) [m^2 s/rad]; :meth:`scaled` makes it higher.
 
-        Parameters
-        ----------
-        omega, density
-            Frequencies (k,) [rad/s] and variance densities (k,) [m^2 s/rad].
-        beyond
-            What is above the last row: `decay`, falling as omega^-5, or `zero`.
+        Above the last row it may `decay`, falling as omega^-5, or be `zero`.
         """
         rows, values = (tuple(np.ravel(column).tolist()) for column in (omega, density))
         return cls(kind="measured", table=SpectrumTable(omega=rows, density=values, beyond=beyond))
 
     def density(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the variance density of the surface elevation.
-
-        Parameters
-        ----------
-        omega
-            Frequencies [rad/s], any shape; at and below zero the density is zero.
-
-        Returns
-        -------
-        FloatArray
-            S(omega) [m^2 s/rad], one-sided, same shape.
-        """
+        """Return the one-sided density [m^2 s/rad], any shape; zero at and below omega = 0."""
         frequency = np.asarray(omega, dtype=np.float64)
         result = np.zeros(frequency.shape)
         some = frequency > self._zero_below
@@ -354,15 +338,10 @@ def takes(kind: str) -> str:
 
 
 def highest_of(density: Callable[[FloatArray], FloatArray], peaks: Sequence[float]) -> float:
-    """Return the frequency at which a sum of spectra is highest [rad/s].
+    """Return the frequency at which a sum of spectra, (k,) -> (k,), is highest [rad/s].
 
-    Parameters
-    ----------
-    density
-        The sum, (k,) -> (k,).
-    peaks
-        Where its parts are highest, above zero [rad/s]: the maximum of the sum is near one of
-        them, and may be the kink of a JONSWAP, so they stay among the candidates throughout.
+    It is near one of the `peaks` of its parts [rad/s], and may be the kink of a JONSWAP, so they
+    stay among the candidates throughout.
 
     Examples
     --------

@@ -165,12 +165,9 @@ class SeaSection(Section):
         return 2.0 * math.pi / self.to_spectrum().peak_frequency
 
     def peaking_at(self, period: float) -> dict[str, float]:
-        """Return the changes of a case that put the peak of its sea at a period.
+        """Return the changes of a case that put the peak of its sea at a period T_p [s].
 
-        Parameters
-        ----------
-        period
-            T_p [s]; the height stays, also where it came from the wind.
+        The height stays, also where it came from the wind.
 
         Raises
         ------

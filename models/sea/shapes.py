@@ -39,14 +39,7 @@ H_s and T_p.
 
 
 def jonswap_gamma(peak_period: float, significant_height: float) -> float:
-    """Return the JONSWAP peak enhancement that belongs to T_p and H_s (DNV-RP-C205, 3.5.5.5).
-
-    Parameters
-    ----------
-    peak_period
-        T_p [s].
-    significant_height
-        H_s [m].
+    """Return the JONSWAP peak enhancement of T_p [s] and H_s [m] (DNV-RP-C205, 3.5.5.5).
 
     Examples
     --------
@@ -60,28 +53,18 @@ def jonswap_gamma(peak_period: float, significant_height: float) -> float:
 
 
 def breaking_steepness(peak_period: float | FloatArray) -> FloatArray:
-    """Return the significant steepness above which seas are not observed [-].
+    """Return the significant steepness above which seas are not observed [-], by T_p [s].
 
     1/15 for peak periods up to 8 s, 1/25 from 15 s, linear in between (DNV-RP-C205, 3.5.4).
-
-    Parameters
-    ----------
-    peak_period
-        T_p, any shape [s].
     """
     return np.asarray(np.interp(peak_period, (8.0, 15.0), (1.0 / 15.0, 1.0 / 25.0)))
 
 
 def fully_developed_period(significant_height: float) -> float:
-    r"""Return the peak period of a fully developed sea, by Pierson and Moskowitz [s].
+    r"""Return the peak period of a fully developed sea of H_s [m], by Pierson and Moskowitz [s].
 
     Their spectrum :math:`\alpha g^2 \omega^{-5} \exp(-\tfrac54 (\omega_p/\omega)^4)` with alpha =
     0.0081 has the variance :math:`\alpha g^2 / (5 \omega_p^4)`, so H_s alone gives its peak.
-
-    Parameters
-    ----------
-    significant_height
-        H_s [m].
 
     Examples
     --------
@@ -136,16 +119,9 @@ def library_density(
 
 
 def depth_function(omega: FloatArray, depth: float) -> FloatArray:
-    r"""Return what water of finite depth leaves of a spectrum [-]: Kitaigorodskii's function.
+    r"""Return what water of a depth d [m] leaves of a spectrum [-]: Kitaigorodskii's function.
 
     .. math:: \phi = \tanh^2(kd) / (1 + 2 k d / \sinh 2 k d), \qquad \omega^2 = g k \tanh k d
-
-    Parameters
-    ----------
-    omega
-        Frequencies above zero [rad/s].
-    depth
-        Water depth d [m].
 
     Examples
     --------
@@ -188,21 +164,11 @@ def gaussian_widths(peak: float) -> tuple[float, float]:
 
 
 def fully_arisen(wind_speed: float) -> tuple[float, float]:
-    """Return the fully arisen sea of a wind, linear between the rows of :data:`WIND_TABLE`.
+    """Return H_s [m] and T_S [s] of a wind [m/s], linear between the rows of :data:`WIND_TABLE`.
 
     The table gives the average period; the period of the energy's maximum in such a sea (Pierson,
     Neumann and James 1955) is sqrt(2) times as long, and this is what the thesis takes as T_S:
     8.1 s at 20 knots, where the table has 5.7 s.
-
-    Parameters
-    ----------
-    wind_speed
-        Wind speed [m/s].
-
-    Returns
-    -------
-    significant_height, significant_period
-        H_s [m] and T_S [s].
 
     Raises
     ------

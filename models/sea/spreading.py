@@ -40,15 +40,9 @@ _NODES = {"cos-2s": 65, "cos-n": 33}
 
 @dataclass(frozen=True, kw_only=True)
 class Spreading:
-    """A spreading law.
+    """A spreading law, `cos-2s` or `cos-n`, of an exponent s or n [-], 0 to 500.
 
-    Attributes
-    ----------
-    kind
-        `cos-2s` or `cos-n`.
-    exponent
-        s of the first, n of the second [-], 0 to 500.  Wind seas have s about 5 to 15 (n 2 to 6),
-        swell s of 30 and more.
+    Wind seas have s about 5 to 15 (n 2 to 6), swell s of 30 and more.
 
     Raises
     ------
@@ -74,18 +68,7 @@ class Spreading:
         check_range("spreading", "exponent", self.exponent, low=0.0, high=500.0)
 
     def density(self, angle: npt.ArrayLike) -> FloatArray:
-        """Return the share of the energy per radian.
-
-        Parameters
-        ----------
-        angle
-            Angles from the mean heading, any shape, any turn [rad].
-
-        Returns
-        -------
-        FloatArray
-            D, same shape [1/rad].
-        """
+        """Return the share of the energy per radian at angles from the mean, any shape [rad]."""
         from scipy.special import gammaln  # here, so that a long-crested sea does not load it
 
         turned = np.asarray(angle, dtype=np.float64)
@@ -100,21 +83,11 @@ class Spreading:
         return result
 
     def nodes(self, mean_heading: float, count: int | None = None) -> tuple[FloatArray, FloatArray]:
-        """Return headings and weights of the mean over the sea's directions.
+        """Return headings in [0, 2 pi) [rad] and weights [-] of the mean over directions, (n,).
 
-        Parameters
-        ----------
-        mean_heading
-            Where most waves travel towards, counter-clockwise from the bow [rad].
-        count
-            Number of headings; 65 for `cos-2s` and 33 for `cos-n` if left out.  Odd numbers include
-            the mean heading.
-
-        Returns
-        -------
-        headings, weights
-            Headings in [0, 2 pi) (n,) [rad], in the order of their angle from the mean, and
-            weights (n,) [-] that add up to one: ``weights @ f(headings)`` is the mean of f.
+        They are in the order of their angle from the mean heading, where most waves travel towards,
+        counter-clockwise from the bow [rad]; ``weights @ f(headings)`` is the mean of f.  By
+        default they are 65 for `cos-2s` and 33 for `cos-n`; odd numbers include the mean heading.
 
         Raises
         ------

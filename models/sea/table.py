@@ -123,13 +123,7 @@ class SpectrumTable:
 
 
 def row_faults(omega: FloatArray, density: FloatArray) -> list[tuple[str, str]]:
-    """Return what is wrong with the rows of a table, as pairs of a column, or none, and a sentence.
-
-    Parameters
-    ----------
-    omega, density
-        Frequencies [rad/s] and densities [m^2 s/rad], finite numbers each.
-    """
+    """Return what is wrong with rows [rad/s], [m^2 s/rad]: a column, or none, and words."""
     fault = ascending_fault(omega)
     if fault:
         return [("omega", fault)]

@@ -50,12 +50,9 @@ _AT = {name: i for i, name in enumerate(HEARD)}
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measurement:
-    """One sample of what a controller sees.
+    """One sample of what a controller sees, in the order of `HEARD`, (16,).
 
-    Parameters
-    ----------
-    values
-        Values in the order of `HEARD`, (16,); not copied, as a loop makes thousands.
+    It is not copied, as a loop makes thousands.
 
     Examples
     --------
@@ -122,15 +119,10 @@ class Controller(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recursion:
-    """A controller as a function: (xc, m) -> (xc_next, u).
+    """A controller as a function: (xc, m) -> (xc_next, u), a casadi.Function, from an initial xc.
 
-    Parameters
-    ----------
-    function
-        casadi.Function of the state xc, (nxc, 1), which may be empty, and the measurements
-        m, (16, 1), in the order of `HEARD`; returns the next state and the command.
-    initial
-        State before the first sample, (nxc,).
+    The state xc is (nxc, 1) and may be empty; the measurements m are (16, 1), in the order of
+    `HEARD`.
 
     Raises
     ------

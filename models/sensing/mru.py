@@ -53,14 +53,9 @@ _HILBERT = 60.0  # reach of the kernel that turns the phase, either way [s]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MruBlock(ReadOnlyArrays):
-    """What the unit shows in a stretch of samples.
+    """What the unit shows in a stretch of samples, (n,): heave [m] and heave rate [m/s].
 
-    Parameters
-    ----------
-    heave, heave_rate
-        Reported motion of the hook [m], [m/s], (n,); held where it is not valid.
-    valid
-        1 where the unit works, else 0 (n,).
+    They are held where `valid`, else 1, is 0.
     """
 
     heave: FloatArray
@@ -256,13 +251,8 @@ class MruModel:
     def heard(self, read: Read, start: int, count: int) -> tuple[FloatArray, FloatArray]:
         """Return heave and heave rate with gain and phase error, (count,) each.
 
-        Parameters
-        ----------
-        read
-            Gives heave [m] and heave rate [m/s] at so many samples from one on; what lies before
-            the run or after it is not known, and 0.
-        start, count
-            First sample, and how many.
+        `read` gives heave [m] and heave rate [m/s] at so many samples from one on; what lies before
+        the run or after it is not known, and 0.
         """
         gain, phase = (sign * e for sign, e in zip(self.signs, self._stated, strict=True))
         if phase == 0.0:
@@ -314,12 +304,8 @@ class MruModel:
     ) -> tuple[MruBlock, MruState]:
         """Return what the unit shows over the samples that follow a state, and the next state.
 
-        Parameters
-        ----------
-        state
-            What `initial` or the block before returned; it is not changed.
-        displacement, velocity
-            True motion of the hook at the samples [m], [m/s], (n,), n > 0.
+        The true motion of the hook at the samples is [m], [m/s], (n,), n > 0; the state, of
+        `initial` or of the block before, is not changed.
         """
         true = np.column_stack((displacement, velocity))
         n, start = len(true), state.sample

@@ -65,15 +65,7 @@ SAMPLE_TIME = 0.01  # of the load cell's noise, which a data sheet gives per sam
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UnitError:
-    """What a reference unit shows too much of a hook's heave, as a spectrum.
-
-    Attributes
-    ----------
-    unit
-        The unit.
-    hook
-        Motion of the hook, which gain and phase error are of.
-    """
+    """What a reference unit shows too much of a hook's heave, as a spectrum."""
 
     unit: MRU
     hook: HookMotion
@@ -257,18 +249,12 @@ def _aboard(outputs: Sequence[str]) -> list[int]:
 
 
 def payload_noise(sensors: Sensors, name: str) -> White | ShapingFilter | None:
-    """Return the noise of a payload signal as the telemetry sends it; None without noise.
+    """Return the noise of a signal, such as ``velocity``, as the telemetry sends it, or None.
 
     Noise of the element passes the low-passes of sensor and link.  That of readings, of which a
     data sheet says how they scatter, is independent from one to the next and passes no low-pass,
-    but is held with them; so it is as white as they carry it, up to half their rate.
-
-    Parameters
-    ----------
-    sensors
-        The sensors of a case.
-    name
-        ``acceleration``, ``velocity`` or ``displacement``.
+    but is held with them; so it is as white as they carry it, up to half their rate.  None without
+    noise.
     """
     payload = sensors.payload
     intensity = 0.5 * float(getattr(payload, f"{name}_noise")) ** 2

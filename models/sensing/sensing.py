@@ -153,31 +153,15 @@ class SensorModel:
     def rows(
         self, noise: FloatArray, telemetry: TelemetryBlock, mru: MruBlock, references: FloatArray
     ) -> FloatArray:
-        """Return the rows of a stretch of samples (n, len(row)).
+        """Return the rows of a stretch of samples (n, len(row)) from what was drawn for them.
 
-        Parameters
-        ----------
-        noise, telemetry, mru
-            What was drawn for these samples.
-        references
-            Displacement, velocity and acceleration asked of the payload (n, 3).
+        The references are displacement, velocity and acceleration asked of the payload (n, 3).
         """
         link = (telemetry.weights, telemetry.fresh, telemetry.age)
         return np.column_stack((noise, *link, mru.heave, mru.heave_rate, mru.valid, references))
 
     def initial(self, raw: npt.ArrayLike) -> FloatArray:
-        """Return the state of sensors that have long seen the plant at rest.
-
-        Parameters
-        ----------
-        raw
-            Values of `RAW` at rest (8,).
-
-        Returns
-        -------
-        ndarray
-            (len(states),).
-        """
+        """Return the state of sensors that have long seen values of `RAW` (8,) at rest."""
         values = np.asarray(raw, dtype=np.float64)
         sent = [
             float(self._rounded(name, values[i] + self._bias(name))) for i, name in enumerate(_SENT)
@@ -252,13 +236,7 @@ class SensorModel:
         )
 
     def noise_rms(self, name: str) -> float:
-        """Return the standard deviation of the noise on a payload signal, before rounding.
-
-        Parameters
-        ----------
-        name
-            ``acceleration``, ``velocity`` or ``displacement``.
-        """
+        """Return the deviation of the noise on ``velocity`` or another signal, before rounding."""
         if name in self.filters:
             return float(math.sqrt(_stationary(self.filters[name])[1]))
         density = float(getattr(self.payload, f"{name}_noise"))
@@ -379,18 +357,11 @@ def _stationary(noise: ShapingFilter) -> tuple[FloatArray, float]:
 def _innovations(
     noise: ShapingFilter, step: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return x' = over x + gain e, n = row x + size e of a sampled noise, e standard normal.
+    """Return x' = over x + gain e, n = row x + size e of a noise each step [s], e standard normal.
 
     Its samples have the covariances of the filter's signal at all lags: the innovations of its
     exact sampling, of which each is one number (B. D. O. Anderson and J. B. Moore, Optimal
     Filtering, 1979, section 9.2).
-
-    Parameters
-    ----------
-    noise
-        The filter, driven by white noise of intensity one.
-    step
-        Time between samples [s].
     """
     over, added = noisy_hold(noise.A, noise.B, step)
     row, P = noise.C, _stationary(noise)[0]

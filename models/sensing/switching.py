@@ -51,10 +51,7 @@ _PER_DECADE, _POINTS = 16, 10  # motor speeds between which shapes are interpola
 class SwitchingShape:
     """The density of the remnant over Delta^2, with one motion of the hook.
 
-    Parameters
-    ----------
-    hook
-        Motion of the hook; only the shape of its velocity's density counts.
+    Only the shape of its velocity's density counts.
     """
 
     def __init__(self, hook: HookMotion) -> None:

@@ -109,13 +109,7 @@ class TelemetrySchedule:
         return range(math.floor(low), math.ceil(high) + 1)
 
     def block(self, start: int, count: int) -> TelemetryBlock:
-        """Return what arrives at the samples from `start` on.
-
-        Parameters
-        ----------
-        start, count
-            First sample, not negative, and number of samples.
-        """
+        """Return what arrives at the samples from `start` on."""
         arrival, content, usable = self._messages(start - self.lags.stop, start + count)
         inside = usable & (arrival >= start) & (arrival < start + count)
         best = np.full(count + 1, -math.inf)

@@ -38,14 +38,9 @@ _SOURCE_NAME = "kernel.c"  # the same for all: it ends up in the library's bytes
 
 @dataclass(frozen=True, kw_only=True)
 class Compiler:
-    """A C compiler.
+    """A C compiler: program and arguments that come before ours, and its version's first line.
 
-    Parameters
-    ----------
-    command
-        Program and arguments that come before ours.
-    version
-        The first line it says about its version; part of every library's name.
+    That is part of every library's name.
     """
 
     command: tuple[str, ...]
@@ -86,14 +81,9 @@ def _version(command: tuple[str, ...], changed: int, size: int) -> str | None:
 
 
 def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:
-    """Return a C source as a loaded library, from the cache if it was compiled before.
+    """Return a whole C source as a loaded library, from the cache if it was compiled before.
 
-    Parameters
-    ----------
-    source
-        The whole C source; symbols to be found must be exported, the rest stays hidden.
-    compiler
-        From `find_compiler`.
+    Symbols to be found must be exported, the rest stays hidden.
 
     Raises
     ------

@@ -38,18 +38,11 @@ _ROUNDING = 1e-9  # [-] of a frequency, or of a ratio of times
 def hermite_midpoint(
     z0: Value, v0: Value, a0: Value, z1: Value, v1: Value, a1: Value, h: float
 ) -> tuple[Value, Value]:
-    """Return displacement and velocity in the middle of a step of length `h`.
+    """Return displacement [m] and velocity [m/s] in the middle of a step of length `h` [s].
 
     Cubic Hermite interpolation, of the displacement from the velocities and of the velocity
     from the accelerations: z = (z0 + z1)/2 + h/8 (v0 - v1), v = (v0 + v1)/2 + h/8 (a0 - a1);
     the errors are h^4/384 times the fourth derivative.
-
-    Parameters
-    ----------
-    z0, v0, a0, z1, v1, a1
-        Displacement [m], velocity [m/s], acceleration [m/s2] at both ends.
-    h
-        Length of the step [s].
     """
     displacement = 0.5 * (z0 + z1) + (h / 8.0) * (v0 - v1)
     velocity = 0.5 * (v0 + v1) + (h / 8.0) * (a0 - a1)
@@ -145,10 +138,7 @@ def braked_step(plant: Plant, parameters: Sequence[str], motions: int, step: flo
 def disturbances(moved: ca.SX) -> ca.SX:
     """Return the plant's w: heave, heave rate, no force, no set-point, whatever else moves.
 
-    Parameters
-    ----------
-    moved
-        Displacement, velocity and acceleration of every motion, the hook's first (3 motions,).
+    Of displacement, velocity and acceleration of every motion, the hook's first (3 motions,).
     """
     return ca.vertcat(moved[:2], 0, 0, moved[3:])
 

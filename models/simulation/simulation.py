@@ -160,12 +160,9 @@ class Simulation:
         return replace(self, options=replace(self.options, **changes))
 
     def with_trip(self, whole: Run | None) -> Simulation:
-        """Return it with the scenario's `worst_trip` at its moment, in a run without it.
+        """Return it with the scenario's `worst_trip` at its moment in the run without, whole.
 
-        Parameters
-        ----------
-        whole
-            That run, with every sample; None: leave the trip out, to find the moment by.
+        Without that run the trip is left out, to find the moment by.
         """
         trips = self.scenario.brake_trips
         if whole is not None and self.scenario.worst_trip is not None:

@@ -46,13 +46,7 @@ class Distribution(ABC):
             self._check()
 
     def resolved(self: D, place: Read, width: Read) -> D:
-        """Return the distribution in plain numbers.
-
-        Parameters
-        ----------
-        place, width
-            Read a value, and a distance from the case's own value, in SI.
-        """
+        """Return the distribution in SI; `width` reads a distance from the case's own value."""
         read = {
             name: (width if name in self.widths else place)(value)
             for name, value in self._given().items()
@@ -133,11 +127,8 @@ def _number(value: Value | None) -> float:
 class Uniform(Distribution):
     """Every value between two ends is as likely.
 
-    Parameters
-    ----------
-    low, high
-        The ends.  With `low` alone it is how far the value may be off either way:
-        ``Uniform("20 %")``, ``Uniform("20 ms")``.
+    With `low` alone it is how far the value may be off either way: ``Uniform("20 %")``,
+    ``Uniform("20 ms")``.
     """
 
     low: Value
@@ -268,15 +259,7 @@ class LogNormal(Bell):
 
 @dataclass(frozen=True)
 class Triangular(Distribution):
-    """Likeliest at `mode`, falling in straight lines to both ends.
-
-    Parameters
-    ----------
-    low, high
-        The ends.
-    mode
-        The likeliest value; the case's own if left out.
-    """
+    """Likeliest at `mode`, by default the case's own, falling in lines to both ends."""
 
     low: Value
     high: Value
@@ -307,13 +290,7 @@ class Triangular(Distribution):
 
 @dataclass(frozen=True)
 class Samples(Distribution):
-    """Values that were measured or chosen, each as likely: drawn again, never in between.
-
-    Parameters
-    ----------
-    values
-        The values, at least one.
-    """
+    """Values that were measured or chosen, each as likely: drawn again, never in between."""
 
     values: tuple[Value, ...]
     name: ClassVar[str] = "samples"

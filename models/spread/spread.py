@@ -113,14 +113,9 @@ class Spread:
     def from_dict(
         cls, data: Any, *, source: str = "spread", lines: Mapping[Place, int] | None = None
     ) -> Spread:
-        """Make a spread from the contents of a spread file.
+        """Make a spread from the contents of a spread file: `vary` and, if wanted, `correlations`.
 
-        Parameters
-        ----------
-        data
-            What the file holds: `vary` and, if wanted, `correlations`.
-        source, lines
-            Name and lines of the file, for the messages.
+        Messages name the file's `source` and `lines`.
 
         Raises
         ------

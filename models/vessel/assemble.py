@@ -69,21 +69,9 @@ def numbers(owner: str, line: int, words: Sequence[str]) -> list[float]:
 def grid(
     owner: str, omega: npt.ArrayLike, heading: npt.ArrayLike, values: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
-    """Return rows in any order as a table.
+    """Return rows in any order as frequencies (k,), headings (h,) and operators (k, h, 6).
 
-    Parameters
-    ----------
-    owner
-        The file.
-    omega, heading
-        Frequency [rad/s] and direction in [0, 2 pi) [rad] of each row (n,).
-    values
-        The six operators of each row (n, 6).
-
-    Returns
-    -------
-    tuple[FloatArray, FloatArray, ComplexArray]
-        Frequencies (k,), headings (h,) and operators (k, h, 6).
+    A row (n,) has a frequency [rad/s], a direction in [0, 2 pi) [rad] and six operators.
 
     Raises
     ------
@@ -126,18 +114,11 @@ def grid(
 
 
 def finished(raos: VesselRaos, *, symmetry: str | None = None) -> VesselRaos:
-    """Return a table as every reader hands it over.
+    """Return a table in the project's convention as every reader hands it over.
 
-    The wave's phase is brought to the origin of the motions, and the headings that follow from
-    the vessel's symmetry are filled in: the symmetry that the file tells, or port and starboard
-    where the table itself shows it.
-
-    Parameters
-    ----------
-    raos
-        The table in the project's convention.
-    symmetry
-        One of :data:`models.vessel.symmetry.SYMMETRIES`; None if the file does not tell.
+    The wave's phase is brought to the origin of the motions, and the headings that follow from the
+    vessel's symmetry are filled in: the symmetry that the file tells, or port and starboard where
+    the table itself shows it.  That is one of :data:`models.vessel.symmetry.SYMMETRIES`, or None.
     """
     notes = list(raos.notes)
     found = raos

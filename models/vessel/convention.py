@@ -139,15 +139,10 @@ class Convention:
     def values(
         self, amplitude: npt.ArrayLike, phase: npt.ArrayLike, slope: npt.ArrayLike
     ) -> ComplexArray:
-        """Return operators given as amplitudes and phases.
+        """Return operators given as amplitudes and phases as in the file (..., 6).
 
-        Parameters
-        ----------
-        amplitude, phase
-            As in the file (..., 6).
-        slope
-            Wave slope per metre of amplitude, that is the wave number that the file's program
-            goes by (...,) [rad/m]; used where rotations are over the slope or the steepness.
+        The wave slope per metre of amplitude, the wave number that the file's program goes by
+        (...,) [rad/m], counts where rotations are over the slope or the steepness.
         """
         turn = math.pi / 180.0 if self.phase_unit == "degrees" else 1.0
         angle = np.asarray(phase, dtype=np.float64) * turn

@@ -33,13 +33,6 @@ _HEADING_ERROR = 0.01
 def vessel_raos(vessel: Vessel, owner: str = "case") -> VesselRaos:
     """Return the six motions that a vessel names, at its own speed where the file has it.
 
-    Parameters
-    ----------
-    vessel
-        The section of the case.
-    owner
-        What messages call the case.
-
     Raises
     ------
     InputError
@@ -107,20 +100,7 @@ def heading_remark(vessel: Vessel, sea: SeaSpectrum, owner: str = "case") -> str
 
 @lru_cache(maxsize=256)
 def sea_directions(heading: float, spreading: Spreading | None) -> tuple[FloatArray, FloatArray]:
-    """Return the headings of a sea and their shares; one heading if it is long-crested.
-
-    Parameters
-    ----------
-    heading
-        The mean heading [rad].
-    spreading
-        The sea's spreading; None if it is long-crested.
-
-    Returns
-    -------
-    headings, weights
-        (n,) [rad], (n,).
-    """
+    """Return the headings of a sea (n,) [rad] and their shares (n,); one if it is long-crested."""
     if spreading is None:
         return read_only([heading % (2.0 * np.pi)]), read_only([1.0])
     headings, weights = spreading.nodes(heading)
@@ -170,21 +150,9 @@ def heave_operators(
 def hook_operators(
     vessel: Vessel, spreading: Spreading | None = None, owner: str = "case"
 ) -> tuple[FloatArray, ComplexArray, FloatArray, FloatArray]:
-    """Return the heave of a vessel's hook in each heading of a sea.
+    """Return the heave of a vessel's hook in each heading of a sea, long-crested without spreading.
 
-    Parameters
-    ----------
-    vessel
-        The section of the case.
-    spreading
-        The sea's spreading; None if it is long-crested.
-    owner
-        What messages call the case.
-
-    Returns
-    -------
-    omega, operators, headings, weights
-        Frequencies (k,) [rad/s], operators (k, n) [m/m], headings (n,) [rad], weights (n,).
+    Frequencies (k,) [rad/s], operators (k, n) [m/m], headings (n,) [rad], weights (n,).
 
     Raises
     ------
@@ -230,23 +198,12 @@ def rao_of_hook(
 
 
 def equivalent(operators: ComplexArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the one operator that gives a hook the spectrum of many headings.
+    """Return amplitude [m/m] and phase [rad] (k,) that give a hook the spectrum of many headings.
 
     The amplitude is the root of the weighted mean of squares.  The phase is that of the weighted
     mean, which is the phase of the cross-spectrum of the hook and the wave at the hook: for narrow
-    spreading it is the operator's own.
-
-    Parameters
-    ----------
-    operators
-        Operators (k, n).
-    weights
-        Shares of the headings (n,), adding up to one.
-
-    Returns
-    -------
-    amplitude, phase
-        Of the equivalent operator (k,) [m/m], [rad].
+    spreading it is the operator's own.  The operators are (k, n), the shares of the headings (n,)
+    add up to one.
     """
     amplitude: FloatArray = np.sqrt(np.abs(operators) ** 2 @ weights)
     return amplitude, np.angle(operators @ weights)

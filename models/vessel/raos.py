@@ -231,15 +231,10 @@ class VesselRaos(ReadOnlyArrays):
         return found.reshape(*shape, len(MODES))
 
     def at(self, point: Sequence[float]) -> VesselRaos:
-        """Return the motions of another point of the same rigid vessel.
+        """Return the motions of another point (3,) [m] of the rigid vessel, in the same frame.
 
         Small angles; complex, so that every motion keeps its phase.  The point of zero wave
         phase stays where it is.
-
-        Parameters
-        ----------
-        point
-            The point, in the same frame as `origin` (3,) [m].
 
         Raises
         ------
@@ -254,28 +249,18 @@ class VesselRaos(ReadOnlyArrays):
         return replace(self, values=self.values @ transport((x, y, z)).T, origin=place)
 
     def heave_at(self, point: Sequence[float], heading: float) -> ComplexArray:
-        """Return the heave of a point at the table's frequencies (k,) [m/m].
+        """Return the heave of a point (3,) [m] at the table's frequencies (k,) [m/m].
 
-        Parameters
-        ----------
-        point
-            The point, in the same frame as `origin` (3,) [m].
-        heading
-            Where the waves travel towards [rad].
+        In waves that travel towards a heading [rad].
         """
         moved: ComplexArray = self.at(point).response(self.omega, heading)[:, 2]
         return moved
 
     def with_phase_origin(self, place: Sequence[float]) -> VesselRaos:
-        """Return the same motions against a wave of zero phase at another place in plan.
+        """Return the same motions against a wave of zero phase at another place in plan (2,) [m].
 
         Elevation at P1 over that at P0 is exp(-i k (P1 - P0) . (cos b, sin b)); motion per
         elevation is divided by it.
-
-        Parameters
-        ----------
-        place
-            Where the wave has zero phase, in the same frame as `origin` (2,) [m].
         """
         new = (float(place[0]), float(place[1]))
         dx, dy = new[0] - self.phase_origin[0], new[1] - self.phase_origin[1]
@@ -380,21 +365,9 @@ def _between_rows(
     wanted: FloatArray,
     wave_number: Callable[[npt.ArrayLike], FloatArray],
 ) -> ComplexArray:
-    """Interpolate a table along its frequencies.
+    """Interpolate a table (k, h, 6) along its frequencies, to `wanted` (n,), at least zero [rad/s].
 
-    Parameters
-    ----------
-    omega, values
-        The table's frequencies (k,) [rad/s] and operators (k, h, 6).
-    wanted
-        Frequencies (n,), at least zero [rad/s].
-    wave_number
-        Wave number of a frequency, for the angles below the table.
-
-    Returns
-    -------
-    ComplexArray
-        Operators (n, h, 6).
+    The wave number is for the angles below the table.
     """
     check_range("RAOs", "omega", float(wanted.min(initial=0.0)), low=0.0, unit="rad/s")
     inside = np.clip(wanted, omega[0], omega[-1])
@@ -433,23 +406,10 @@ def _between_headings(
     weights: FloatArray,
     column: npt.NDArray[np.intp],
 ) -> ComplexArray:
-    """Return weighted sums of a table's headings.
+    """Return weighted sums (m, 6) of a table's headings, operators (n, h, 6), at points (m,).
 
-    Parameters
-    ----------
-    table
-        Operators (n, h, 6).
-    row
-        Which of the n frequencies each point has (m,).
-    weights
-        Of the table's headings at each of u headings (u, h).
-    column
-        Which of the u headings each point has (m,).
-
-    Returns
-    -------
-    ComplexArray
-        Operators (m, 6).
+    `row` and `column` say which of the n frequencies, and which of the rows of `weights` (u, h),
+    each point has.
     """
     found = np.empty((row.size, len(MODES)), dtype=np.complex128)
     for i, share in enumerate(weights):

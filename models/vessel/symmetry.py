@@ -27,14 +27,9 @@ _CIRCLE = 72  # headings made of one, for a body of revolution
 
 
 def completed(raos: VesselRaos, symmetry: str) -> VesselRaos:
-    """Return the table with the headings that follow from a symmetry.
+    """Return the table with the headings that follow from one of :data:`SYMMETRIES`.
 
-    Parameters
-    ----------
-    raos
-        A table whose origin is on the plane, or the axis, of symmetry.
-    symmetry
-        One of :data:`SYMMETRIES`.
+    Its origin is on the plane, or the axis, of symmetry.
 
     Raises
     ------
@@ -74,14 +69,9 @@ def looks_symmetric(raos: VesselRaos) -> bool:
 def joined(
     heading: FloatArray, values: ComplexArray, turned: FloatArray, others: ComplexArray
 ) -> tuple[FloatArray, ComplexArray]:
-    """Return a table with those of other headings that it does not have.
+    """Return a table (h,) [rad], (k, h, 6) with those of other headings that it does not have.
 
-    Parameters
-    ----------
-    heading, values
-        The table's headings in [0, 2 pi) (h,) [rad], and what it has there (k, h, 6).
-    turned, others
-        The other headings, of any turn (n,) [rad], and what is there (k, n, 6).
+    These are of any turn (n,) [rad]; the table's own are in [0, 2 pi).
     """
     turn = 2.0 * math.pi
     new = np.mod(turned, turn)

@@ -43,13 +43,9 @@ BEYOND = ("hold", "zero", "decay")
 
 @dataclass(frozen=True, kw_only=True)
 class OutsideShare:
-    """Share of a variance that comes from outside a RAO's table [-].
+    """Shares of a variance below the first and beyond the last frequency of a RAO's table [-].
 
-    Attributes
-    ----------
-    below, beyond
-        Shares below the first and above the last frequency of the table.  Where the RAO is cut
-        to zero the share is what holding its end value would have given.
+    Where the RAO is cut to zero the share is what holding its end value would have given.
     """
 
     below: float
@@ -131,18 +127,7 @@ class HeaveRao:
         object.__setattr__(self, "phase", read_only(phase))
 
     def response(self, omega: npt.ArrayLike) -> ComplexArray:
-        """Return the complex operator.
-
-        Parameters
-        ----------
-        omega
-            Frequencies [rad/s], any shape, at least zero.
-
-        Returns
-        -------
-        ComplexArray
-            Hook heave per wave elevation [m/m], same shape.
-        """
+        """Return hook heave per wave elevation [m/m] at frequencies, at least zero [rad/s]."""
         frequency = np.asarray(omega, dtype=np.float64)
         phases = self._phases
         phase = np.interp(frequency, self.omega, phases)
@@ -154,18 +139,7 @@ class HeaveRao:
         return result
 
     def gain(self, omega: npt.ArrayLike) -> FloatArray:
-        """Return the operator's amplitude, which is all that a spectrum asks for.
-
-        Parameters
-        ----------
-        omega
-            Frequencies [rad/s], any shape, at least zero.
-
-        Returns
-        -------
-        FloatArray
-            Amplitude of the hook's heave per wave amplitude [m/m], same shape.
-        """
+        """Return the operator's amplitude [m/m], all that a spectrum asks for."""
         frequency = np.asarray(omega, dtype=np.float64)
         rows, amplitudes = self.omega, self.amplitude
         # np.interp holds the end values, which is `hold`.
@@ -193,15 +167,7 @@ class HeaveRao:
         return tuple(float(w) for w in self.omega)
 
     def share_outside(self, spectrum: SpectralDensity, derivative: int = 0) -> OutsideShare:
-        """Return the share of the hook's variance that comes from outside the table.
-
-        Parameters
-        ----------
-        spectrum
-            The sea.
-        derivative
-            Which motion: 0 displacement, 1 velocity, 2 acceleration.
-        """
+        """Return the share of the variance of derivative 0, 1 or 2 from outside the table."""
         # What is cut to zero cannot be measured; hold the end value to see what is missing.
         filled = replace(
             self,

@@ -117,13 +117,7 @@ class Clairvoyant(ReadOnlyArrays):
         )
 
     def verify(self) -> RecordVerification:
-        """Simulate the demand on the linear plant by another route.
-
-        Returns
-        -------
-        RecordVerification
-            Whether payload rms and limits are confirmed, and by how much.
-        """
+        """Simulate the demand on the linear plant by another route, to confirm the answer."""
         return verify_record(
             self.case,
             self.problem,
@@ -158,14 +152,9 @@ def floor_of(
     iterations: int,
     began: float,
 ) -> Clairvoyant:
-    """Return the numbers of an answer; the arguments are attributes of `Clairvoyant`.
+    """Return the numbers of an answer, begun at `began` by `time.perf_counter` [s].
 
-    Parameters
-    ----------
-    case, limits, start, settle, problem, solution, iterations
-        As the attributes.
-    began
-        When the work began, by `time.perf_counter` [s].
+    The other arguments are attributes of `Clairvoyant`.
     """
     plant, N = problem.plant, problem.samples
     y = rollout(problem, solution.start, solution.inputs)

@@ -46,14 +46,7 @@ _FINE = (1e-6, 1e4)  # below this mean square [m2] once more with this factor
 
 
 def solve_record(problem: RecordProblem, *, block: int | None = None) -> RecordSolution:
-    """Solve the programme.
-
-    Parameters
-    ----------
-    problem
-        The programme.
-    block
-        Samples per block, 1 to 16; by default some that suit the number of states.
+    """Solve the programme, in blocks of 1 to 16 samples; by default what suits the states.
 
     Raises
     ------

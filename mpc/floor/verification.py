@@ -62,15 +62,7 @@ def verify_record(
     payload: FloatArray,
     payload_rms: float,
 ) -> RecordVerification:
-    """Simulate a solution's demand and compare.
-
-    Parameters
-    ----------
-    case, problem, solution
-        What was solved.
-    payload, payload_rms
-        What is claimed, (N+1,) [m] and [m].
-    """
+    """Simulate a solution's demand, and compare with the claimed payload (N+1,) [m] and rms [m]."""
     sampled, N, dt = problem.plant, problem.samples, problem.plant.sample_time
     count = sum(name.endswith("displacement") for name in sampled.states)
     linear = build_plant(PlantData.from_case(case).viscous, count).linearise(drag=sampled.drag)

@@ -360,10 +360,7 @@ class KnotRegression:
     def fit(self, power: FloatArray) -> Iterator[None]:
         """Solve for a new model, a part of the work at each turn of the iterator.
 
-        Parameters
-        ----------
-        power
-            Mean squares of the record [m2], (2,): no forecast's variance is larger.
+        No forecast's variance is larger than the mean squares of the record, `power` (2,) [m2].
         """
         n, N = self._n, self.samples
         if N < _LEAST_SAMPLES:
@@ -447,24 +444,12 @@ class KnotRegression:
 
 
 def smoother(at: npt.NDArray[np.int64], half: int, step: float, spacing: float) -> FloatArray:
-    """Return the matrix from a stretch of the record to its smoothed knots.
+    """Return the matrix (2k, 2m) from a stretch of the record to its smoothed knots (k,).
 
     A quartic is fitted by least squares to heave and rate of the samples from `half` before to
-    `half` after each knot.
-
-    Parameters
-    ----------
-    at
-        Knots in samples from the first (k,).
-    half
-        Samples on either side.
-    step, spacing
-        Sample time, and what the record's rates are multiplied with [s].
-
-    Returns
-    -------
-    ndarray
-        (2k, 2m) for the m samples from `half` before the first knot to `half` after the last.
+    `half` after each knot.  Knots are in samples from the first; rates of the record are multiplied
+    with `spacing` [s].  The m samples are those from `half` before the first knot to `half` after
+    the last.
     """
     t = step * np.arange(-half, half + 1)
     powers = np.arange(5)
@@ -481,19 +466,10 @@ def smoother(at: npt.NDArray[np.int64], half: int, step: float, spacing: float) 
 
 
 def hermite_weights(knots: FloatArray, at: FloatArray) -> FloatArray:
-    """Return the matrix that interpolates values and rates at knots (cubic Hermite).
+    """Return the matrix that interpolates values and rates at knots [s], (k,) (cubic Hermite).
 
-    Parameters
-    ----------
-    knots
-        Ascending times of the knots [s], (k,), k >= 2.
-    at
-        Times within the knots' range [s], (n,).
-
-    Returns
-    -------
-    ndarray
-        (2n, 2k): [value; rate] at the times from [value, rate] of the first knot, the second...
+    It is (2n, 2k): [value; rate] at times within the knots' range (n,) [s] from [value, rate] of
+    the first knot, the second...
     """
     each = np.eye(2 * knots.size)
     spline = CubicHermiteSpline(knots, each[0::2], each[1::2])

@@ -23,15 +23,10 @@ _MOST_LEADS = 100_000
 class Forecast:
     """The hook's motion at the leads of the predictor that made it; lead 0 is now.
 
-    The arrays are the caller's own to read: they are not copied, as a controller makes one
-    forecast a sample, and a predictor never writes to them again.
-
-    Parameters
-    ----------
-    displacement, velocity
-        Mean of the true motion, up positive [m], [m/s], (n,).
-    displacement_std, velocity_std
-        Standard deviation of what will be minus the mean [m], [m/s], (n,).
+    The arrays are the caller's own to read: they are not copied, as a controller makes one forecast
+    a sample, and a predictor never writes to them again.  The mean of the true motion is up
+    positive [m], [m/s], (n,); each ``_std`` is the standard deviation of what will be minus the
+    mean, likewise.
     """
 
     displacement: FloatArray

@@ -23,18 +23,11 @@ _CHUNK = 4096  # samples read at once: a day at 1 ms would be 86 million rows
 
 
 class PerfectPreview:
-    """The hook's record itself, at now + leads; standard deviation zero.
+    """The hook's record itself, at now + leads up to a horizon [s]; standard deviation zero.
 
     Whoever runs a simulation hands over the record first, by `foresee`.  Between the record's
     rows it is the cubic that has their displacements and velocities (exact at the rows); before
     its first and beyond its last row it is held, with velocity zero.
-
-    Parameters
-    ----------
-    sample_time
-        Time between samples and between leads [s].
-    horizon
-        Last lead [s].
 
     Raises
     ------
@@ -51,13 +44,7 @@ class PerfectPreview:
         self._time = math.nan
 
     def foresee(self, motion: Motion) -> None:
-        """Take the hook's record of the run that follows.
-
-        Parameters
-        ----------
-        motion
-            The motion, with row 0 at time 0; it is sampled here once.
-        """
+        """Take the record of the run that follows, row 0 at time 0; it is sampled here once."""
         last = math.floor((motion.rows - 1) * motion.step / self.sample_time + 1e-9)
         record = np.zeros((2, last + 1 + self.leads.size))
         for start in range(0, last + 1, _CHUNK):

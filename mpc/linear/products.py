@@ -26,15 +26,7 @@ _WIDE = 1e20  # no limit, for the solver
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Products:
-    """Matrices of one step; `of` makes them.
-
-    Attributes
-    ----------
-    rows
-        R, scaled, (nr, nb).
-    scale
-        What each row is multiplied by, (nr,).
-    """
+    """Matrices of one step: rows R (nr, nb), and what each is scaled by, (nr,); `of` makes them."""
 
     size: int
     moves: int

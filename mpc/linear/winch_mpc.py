@@ -426,15 +426,9 @@ class DriveWindow:
     def asked(self, move: float, low: float, high: float, change: float) -> tuple[float, float]:
         """Return the input to ask of the drive, and the torque it then holds over the sample.
 
-        A move at the edge of the window asks for as much more as keeps the drive at its peak to
-        the end of the sample; elsewhere the held torque is NaN.
-
-        Parameters
-        ----------
-        move, low, high
-            The first move and its bounds.
-        change
-            Change of speed over the sample, as planned [rad/s].
+        A move at the edge of the window asks for as much more as keeps the drive at its peak to the
+        end of the sample; elsewhere the held torque is NaN.  Its arguments are the first move, its
+        bounds, and the change of speed over the sample, as planned [rad/s].
         """
         torque = min(max(move, low), high) * self._unit
         fall = min(max(self.fall * change, -2.0 * _MOST * self.peak), 2.0 * _MOST * self.peak)
@@ -451,13 +445,6 @@ class TorqueBudget:
 
     A winding of one time constant, theta' = ((tau / tau_rated)^2 - theta) / T_th, starting cold;
     the cap is the torque which, held over the horizon, would just bring it to its rated rise.
-
-    Parameters
-    ----------
-    case
-        For the rating and the time constant.
-    sample_time, horizon
-        [s].
     """
 
     def __init__(self, case: Case, sample_time: float, horizon: float) -> None:

@@ -98,21 +98,8 @@ def sea_at_end(
     """Return the sea's state at the end of a path as a linear function of path and state.
 
     The conditional mean of the Gaussian sea, given its estimate at the start and displacement and
-    velocity of the hook at every sample but for a faint error.
-
-    Parameters
-    ----------
-    model
-        The model.
-    steps
-        N.
-    covariance
-        Of the estimate at the start, (nh, nh).
-
-    Returns
-    -------
-    from_path, from_sea
-        (nh, 2 (N + 1)), (nh, nh).
+    velocity of the hook at every sample but for a faint error.  They are (nh, 2 (N + 1)), (nh, nh),
+    for N steps and the covariance of the estimate at the start (nh, nh).
     """
     at = model.sea_at
     added = (model.G @ model.G.T)[at, at]

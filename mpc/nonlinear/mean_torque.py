@@ -27,13 +27,8 @@ from ..winch import SampledWinch
 class Drift(ReadOnlyArrays):
     """By how much the torque at the start of a sample is over its mean [N m].
 
-    Attributes
-    ----------
-    state, hook, constants
-        Of the winch's state, of the hook's (z, z') at both ends of the sample and of the constants,
-        (n,), (4,), (2,).
-    mean
-        Of the mean torque [-].
+    Of the winch's state, of the hook's (z, z') at both ends of the sample and of the constants it
+    is (n,), (4,), (2,); of the mean torque a number [-].
     """
 
     state: FloatArray
@@ -56,11 +51,6 @@ def mean_torque(winch: SampledWinch) -> tuple[SampledWinch, Drift]:
 
     With theta the motor's angle, the demand d_0 = b (u - u_rest - K omega_0) at the start has the
     mean d = d_0 - b K ((theta_1 - theta_0)/T - omega_0), which is linear in all that is known.
-
-    Parameters
-    ----------
-    winch
-        The winch whose input is the torque at the start.
     """
     angle = winch.plant.states.index("motor.angle")
     n, T, falls = winch.size, winch.sample_time, winch.gain * winch.back

@@ -62,12 +62,7 @@ class Known:
 class Linearisation:
     """The horizon linearised about a plan, ready for what is known; `Shooting.linearise` makes it.
 
-    Attributes
-    ----------
-    H
-        Hessian, (nb, nb).
-    outputs
-        The outputs' derivatives, (no, nb).
+    The Hessian H is (nb, nb), the outputs' derivatives (no, nb).
     """
 
     H: FloatArray

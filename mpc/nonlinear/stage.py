@@ -94,13 +94,7 @@ class Stage(ReadOnlyArrays):
         return tuple(self.law.arguments)
 
     def forces(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return forces [N or N m] and derivatives at nodes, (K, m) and (K, m, my).
-
-        Parameters
-        ----------
-        y
-            Arguments, (K, my).
-        """
+        """Return forces [N or N m] (K, m) and derivatives (K, m, my) at nodes, of y (K, my)."""
         m = len(self.channels)
         _, out = self.kernel.run(_NOTHING, y, _NOTHING)
         return out[:, :m], out[:, m:].reshape(len(y), m, len(self.arguments))

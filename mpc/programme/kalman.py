@@ -19,13 +19,8 @@ def prediction_covariance(
 ) -> FloatArray:
     """Return the covariance of the steady one-step prediction, (n, n).
 
-    Parameters
-    ----------
-    A, C, G, R
-        The process with noise G n, n white and of variance one, its outputs, and the variances of
-        their errors.
-    scale
-        Size of each state, for the numerics, (n,).
+    Its process has noise G n, n white and of variance one; R are the variances of the errors of its
+    outputs.  For the numerics `scale` is the size of each state, (n,).
 
     Raises
     ------
@@ -79,21 +74,9 @@ def end_of_record(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the state at the end of a record as a linear function of record and first estimate.
 
-    The conditional mean of the state after outputs at samples 0 .. N are known.
-
-    Parameters
-    ----------
-    A, C, Q, R
-        The process, its outputs, and the variances of their errors.
-    P
-        Covariance of the estimate at the first sample, (n, n).
-    steps
-        N.
-
-    Returns
-    -------
-    from_record, from_estimate
-        (n, ny (N + 1)), (n, n).
+    The conditional mean of the state after outputs at samples 0 .. N are known.  They are (n, ny (N
+    + 1)) and (n, n), for N steps and the first estimate's covariance P (n, n).  R are the variances
+    of the outputs' errors.
     """
     n, ny = len(A), len(C)
     record, estimate = np.zeros((n, ny * (steps + 1))), np.eye(n)

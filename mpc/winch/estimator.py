@@ -112,15 +112,8 @@ class WinchEstimator:
         """Return chi at this sample, given what is shown now.
 
         The input over the sample before is that which the drive says it has followed, not the one
-        that it was asked for.
-
-        Parameters
-        ----------
-        measurement
-            What the sensors show.
-        applied
-            Command that does as much as a drive which cut its torque for a part of the sample; NaN
-            for the one that the drive says it has followed.
+        that it was asked for.  `applied` is the command that does as much as a drive which cut its
+        torque for a part of the sample; NaN for the one that the drive says it has followed.
         """
         shown = measurement.values
         winch = self.model.winch

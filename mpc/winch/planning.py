@@ -23,14 +23,7 @@ from .prediction import PredictionModel, prediction_model
 
 
 def plan_model(model: PredictionModel, stiffness: float) -> PredictionModel:
-    """Return the model of the same world on a rope of another stiffness.
-
-    Parameters
-    ----------
-    model
-        What the estimator believes.
-    stiffness
-        Axial stiffness of the plan's rope over that of the case.
+    """Return the estimator's model on a rope of another axial stiffness, over the case's own.
 
     Raises
     ------

@@ -19,12 +19,7 @@ from .prediction import PredictionModel
 def regulator(model: PredictionModel, weight: float) -> LQRegulator:
     """Return the regulator for a weight on the input.
 
-    Parameters
-    ----------
-    model
-        The prediction model.
-    weight
-        What an input of the drive's peak torque costs, over a displacement of the hook's rms.
+    That is what the drive's peak torque costs, over a displacement of the hook's rms.
 
     Raises
     ------

@@ -31,15 +31,7 @@ _LOWEST = 1e-3  # [rad/s]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unsaturated:
-    """Filter and regulator as one linear controller.
-
-    Parameters
-    ----------
-    model
-        What the filter believes.
-    regulator
-        What the controller does with it.
-    """
+    """Filter and regulator as one linear controller."""
 
     model: PredictionModel
     regulator: LQRegulator
@@ -101,17 +93,10 @@ class Unsaturated:
         return float(np.abs(self.poles(plant, share=share)).max())
 
     def sensitivity(self, omega: FloatArray, plant: PredictionModel | None = None) -> ComplexArray:
-        """Return S = 1/(1 + L), the loop broken at the torque, (k,).
+        """Return S = 1/(1 + L), the loop broken at the torque, below half the sample rate, (k,).
 
         The drive's back-EMF, or its speed regulator, is part of the plant's own behaviour, which
-        the controller compensates.
-
-        Parameters
-        ----------
-        omega
-            [rad/s], below half the sample rate, (k,).
-        plant
-            The plant; by default that of the model.
+        the controller compensates.  The plant is by default that of the model.
         """
         true = self.model if plant is None else plant
         z = np.exp(1j * np.asarray(omega, dtype=np.float64) * self.model.winch.sample_time)

@@ -205,12 +205,8 @@ def _search(
 ) -> Weights | None:
     """Return the best weights that are stable on the plants that are off; None without any.
 
-    Parameters
-    ----------
-    throttled
-        Whether they have to be stable there with a drive that gives a part of the torque, too.
-    bounded
-        Whether M_s has to be bounded there.
+    If `throttled`, with a drive that gives a part of the torque, too; if `bounded`, with a bounded
+    M_s.
     """
     others = [prediction_model(model.winch.off(**factors)) for factors in OFF]
     throttling = others if throttled else []

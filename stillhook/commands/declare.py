@@ -75,12 +75,8 @@ def options(text: str, **means: Read) -> Declaration:
         a title:
         --name  what follows a title stands under it
 
-    Parameters
-    ----------
-    text
-        The options.
-    means
-        By an option's name what reads it; a number without a default is `within()` no limits.
+    Beside the text `means` has, by an option's name, what reads it; a number without a default is
+    `within()` no limits.
     """
     lines: list[str] = []
     for line in dedent(text).strip().splitlines():
@@ -145,12 +141,7 @@ def changed_words(
 ) -> list[str]:
     """Return the options that are not at their defaults, as words of the same command again.
 
-    Parameters
-    ----------
-    arguments, declarations
-        What was given, and what the command takes.
-    changes
-        Other values than those given, by name; a default leaves an option out.
+    Values of `changes`, by name, take the place of those given; a default leaves an option out.
     """
     parser = argparse.ArgumentParser(add_help=False)
     declared(parser, declarations)

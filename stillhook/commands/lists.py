@@ -64,14 +64,9 @@ def parse_range(name: str, text: str) -> tuple[float, float]:
 def axis(
     step: float | None, low: float = -math.inf, high: float = math.inf
 ) -> Callable[[str, str], list[float]]:
-    """Return what reads the values of an axis from LOW..HIGH[/STEP] or A,B,..
+    """Return what reads the values of an axis, from `low` to `high`: LOW..HIGH[/STEP] or A,B,..
 
-    Parameters
-    ----------
-    step
-        The step of a range that gives none; None where a range must give its own.
-    low, high
-        Ends of what the values may be.
+    A range that gives no step has `step`; where that is None it must give its own.
 
     Examples
     --------

@@ -44,11 +44,6 @@ def stoppable() -> Iterator[Stop]:
     """Remember the first Ctrl-C instead of raising, so that what runs can end and be kept.
 
     The computation asks between two steps.  A second Ctrl-C raises KeyboardInterrupt as always.
-
-    Yields
-    ------
-    Stop
-        To be asked.
     """
     asked = False
 

@@ -59,13 +59,7 @@ class Refused:
 
 
 class CellBench:
-    """Does tasks, one after the other, and keeps what it prepared for the one before.
-
-    Parameters
-    ----------
-    question, contenders
-        What all are asked, and who is asked.
-    """
+    """Does tasks, one after the other, and keeps what it prepared for the one before."""
 
     def __init__(self, question: ComparisonQuestion, contenders: Sequence[Contender]) -> None:
         self._question = question

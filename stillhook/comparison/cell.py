@@ -168,13 +168,8 @@ class Trace:
 class CommonSea(SpectrumMotion):
     """The hook's motion that every contender meets: drawn for the whole run, whatever the step.
 
-    Attributes
-    ----------
-    lasting
-        Length that it is drawn for [s]: that of the run, which is no multiple of every sample.
-    ease
-        Time in which it grows out of rest [s], where the simulation does not see to that: with
-        the brake on.
+    That run lasts `lasting` [s], no multiple of every sample.  In the first `ease` [s] the motion
+    grows out of rest, where the simulation does not see to that: with the brake on.
     """
 
     lasting: float
@@ -187,11 +182,6 @@ class CommonSea(SpectrumMotion):
 
 class Prepared:
     """A contender in one sea, ready to run.
-
-    Parameters
-    ----------
-    question, contender, height, law
-        What it is asked, who it is, the significant height [m], and its law if it needs one.
 
     Raises
     ------

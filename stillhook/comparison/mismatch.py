@@ -48,10 +48,7 @@ _SIGNED = re.compile(r"^[+-]\s*[0-9.]")
 class Mismatch:
     """What of the plant is not as in the case that the controllers are made for.
 
-    Attributes
-    ----------
-    changes
-        Values by short name of `SHORT` or dotted path of the case, as they were given.
+    `changes` are values by short name of `SHORT` or dotted path of the case, as they were given.
     """
 
     changes: Mapping[str, object]

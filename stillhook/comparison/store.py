@@ -33,19 +33,7 @@ def question_of(question: ComparisonQuestion) -> dict[str, Any]:
 
 
 class Store:
-    """Results on disk, in a journal.
-
-    Attributes
-    ----------
-    laws
-        Designs by what was needed and height [m].
-
-    Parameters
-    ----------
-    path
-        The file; it is made if there is none.
-    question
-        What is asked.
+    """Results on disk, in a journal; `laws` are the designs by what was needed and height [m].
 
     Raises
     ------

@@ -134,12 +134,9 @@ DEFAULTS = tuple(name for name in CONTENDERS if name not in LEFT_OUT)
 
 
 def contenders_of(wanted: Sequence[object] | None) -> tuple[Contender, ...]:
-    """Return the contenders that are meant.
+    """Return the contenders meant by names of `CONTENDERS`, or whatever else `recipe_of` takes.
 
-    Parameters
-    ----------
-    wanted
-        Names of `CONTENDERS`, and whatever else `recipe_of` takes; None for `DEFAULTS`.
+    None stands for `DEFAULTS`.
 
     Raises
     ------

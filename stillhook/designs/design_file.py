@@ -35,19 +35,7 @@ Place = tuple[str | int, ...]
 
 
 def save_design(design: Design, path: str | Path) -> Path:
-    """Write a design to a YAML file, whole or not at all.
-
-    Parameters
-    ----------
-    design
-        The design.
-    path
-        The file; its folder must exist.
-
-    Returns
-    -------
-    Path
-        The file written.
+    """Write a design to a YAML file in a folder that exists, whole or not at all; return its path.
 
     Raises
     ------
@@ -104,15 +92,7 @@ def _further(told: Mapping[str, Any]) -> list[dict[str, Any]]:
 def load_design(path: str | Path) -> Design:
     """Read a design from a file that `save_design` wrote, of this version or an older one.
 
-    Parameters
-    ----------
-    path
-        The file.
-
-    Returns
-    -------
-    Design
-        Equal to the one saved, to the last digit; `verify` checks it anew.
+    It is equal to the one saved, to the last digit; `verify` checks it anew.
 
     Raises
     ------
@@ -213,15 +193,7 @@ def _encoded(value: Any) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class _Reader:
-    """Makes values of annotated types from plain data, and words what is wrong with the data.
-
-    Parameters
-    ----------
-    source
-        Name of the file.
-    lines
-        Line of each path in it.
-    """
+    """Makes values of annotated types from plain data, and words what is wrong with the data."""
 
     source: str
     lines: Mapping[Place, int]

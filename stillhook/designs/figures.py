@@ -57,15 +57,7 @@ _CUT = 2.0  # use of a limit at which its bar is cut off
 def payload_spectrum(design: Design) -> Figure:
     """Return the spectra of hook and payload, with the drum held and with the gains.
 
-    Parameters
-    ----------
-    design
-        The design.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Variance density [m^2 s/rad] on a logarithmic axis over frequency [rad/s].
+    Variance density [m^2 s/rad] on a logarithmic axis over frequency [rad/s].
     """
     view = MotionView(design)
     omega = view.frequencies
@@ -105,15 +97,7 @@ def payload_spectrum(design: Design) -> Figure:
 def responses(design: Design) -> Figure:
     """Return |P/Z| with the drum held and with the gains, and |X/Z|.
 
-    Parameters
-    ----------
-    design
-        The design.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Two logarithmic axes, one above the other, over frequency [rad/s].
+    Two logarithmic axes, one above the other, over frequency [rad/s].
     """
     view = MotionView(design)
     low, high = _response_band(view)
@@ -145,17 +129,7 @@ def responses(design: Design) -> Figure:
 
 @drawn
 def limits(design: Design) -> Figure:
-    """Return the use of each limit as a bar.
-
-    Parameters
-    ----------
-    design
-        The design, of a stable loop.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Bars in percent of each limit; what the case only reports is hatched.
+    """Return the use of each limit as a bar, in percent; what the case only reports is hatched.
 
     Raises
     ------
@@ -339,15 +313,8 @@ class PlaneWindow:
 def nyquist(design: Design) -> Figure:
     """Return the Nyquist curve of the loop gain L with the circle of M_s around -1.
 
-    Parameters
-    ----------
-    design
-        The design; its loop may be unstable.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Real against imaginary part of L(i omega) near -1; the loop is broken at the command.
+    Real against imaginary part of L(i omega) near -1; the loop is broken at the command, and may be
+    unstable.
 
     Raises
     ------

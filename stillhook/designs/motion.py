@@ -33,13 +33,7 @@ HOOK = "hook.heave"
 
 @dataclass(frozen=True, eq=False)
 class MotionView:
-    """Hook and payload of a design, as spectra and as numbers.
-
-    Parameters
-    ----------
-    design
-        The design.
-    """
+    """Hook and payload of a design, as spectra and as numbers."""
 
     design: Design
 

@@ -39,13 +39,7 @@ _ROWS = 12  # and of the table
 
 @drawn
 def robust_figure(design: RobustDesign) -> Figure:
-    """Return payload motion and M_s of the scenarios, and the random draws' distribution.
-
-    Parameters
-    ----------
-    design
-        A design with at least one stable scenario.
-    """
+    """Return payload rms and M_s of the scenarios, one stable at least, and the random draws."""
     shown = design.scenarios[:_SHOWN]
     rms = np.array([s.design.payload_rms for s in shown])
     size, unit = scale("m", float(np.median(rms)))
@@ -80,13 +74,7 @@ def robust_figure(design: RobustDesign) -> Figure:
 
 @drawn
 def schedule_figure(schedule: GainSchedule) -> Figure:
-    """Return the gains over the rope's length, and the payload's motion with them.
-
-    Parameters
-    ----------
-    schedule
-        A schedule that has been looked at.
-    """
+    """Return the gains over the rope's length, and the payload's motion with them."""
     lengths = np.geomspace(schedule.lengths[0], schedule.lengths[-1], 200)
     lengths[[0, -1]] = schedule.lengths[[0, -1]]
     table = [schedule.at(float(v)) for v in lengths]

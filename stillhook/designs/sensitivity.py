@@ -49,12 +49,7 @@ _SMALL = 0.01  # elasticity below which nobody looks
 def tornado_figure(study: Sensitivity, *, bars: int = _BARS) -> Figure:
     """Return bars of the elasticities of the payload's rms and of M_s.
 
-    Parameters
-    ----------
-    study
-        A sensitivity study.
-    bars
-        How many numbers to show at most; those that move neither by 0.01 % are left out.
+    At most so many; numbers that move neither by 0.01 % are left out.
     """
 
     def size(k: int) -> float:
@@ -84,12 +79,7 @@ def tornado_figure(study: Sensitivity, *, bars: int = _BARS) -> Figure:
 def indices_figure(studies: Sequence[SobolIndices], about: str) -> Figure:
     """Return one panel for each figure: first-order and total indices with their intervals.
 
-    Parameters
-    ----------
-    studies
-        Indices over the same ranges, one for each figure, at least one.
-    about
-        What they are of, in small print.
+    The studies are over the same ranges, at least one; `about` stands in small print.
     """
     paths = studies[0].paths
     order = np.argsort(studies[0].total)

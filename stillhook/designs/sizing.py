@@ -42,13 +42,7 @@ _POINTS = 14  # of a table on the terminal
 
 @drawn
 def size_figure(sizing: Sizing) -> Figure:
-    """Return the smallest motor over the gear ratio, marked by the limit that binds.
-
-    Parameters
-    ----------
-    sizing
-        With at least one gear behind which a motor meets the target.
-    """
+    """Return the smallest motor over gear ratios, at least one, marked by the limit that binds."""
     points = [p for p in sizing.points if p.feasible and p.motor is not None]
     lost = [p for p in sizing.points if not p.feasible]
     power = [p.motor.power for p in points if p.motor is not None]
@@ -87,13 +81,7 @@ def size_figure(sizing: Sizing) -> Figure:
 
 @drawn
 def worth_figure(result: Worth) -> Figure:
-    """Return what each figure takes off the payload's rms if it gets twice as good, as bars.
-
-    Parameters
-    ----------
-    result
-        With at least one row.
-    """
+    """Return what each figure takes off the payload's rms if it gets twice as good, as bars."""
     from matplotlib.patches import Patch
 
     rows = [r for r in result.rows if r.gain > 0.0][:_ROWS] or list(result.rows[:1])
@@ -278,13 +266,7 @@ AXES = {
 
 @drawn
 def pareto_figure(front: ParetoFront) -> Figure:
-    """Return the front: payload rms, logarithmic, over the other quantity.
-
-    Parameters
-    ----------
-    front
-        A front of at least two points.
-    """
+    """Return a front of at least two points: payload rms, logarithmic, over the other quantity."""
     bounds = np.array([p.bound for p in front.points])
     rms = np.array([p.payload_rms for p in front.points])
     factor, unit = scale(front.unit, float(bounds.max()))

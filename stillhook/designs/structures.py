@@ -51,21 +51,11 @@ _LABELS = {
 
 @drawn
 def structures(designs: Sequence[Design], *, bound: bool = True) -> Figure:
-    """Return the comparison of some structures on a case.
+    """Return the comparison of structures on a case; those without a stable loop are empty rows.
 
-    Parameters
-    ----------
-    designs
-        Designs of one case; those without a stable controller get an empty row.
-    bound
-        Whether to compute and to mark the bounds beside them.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Left: payload rms on a logarithmic axis, coloured by shares of its variance, hatched
-        where the design is not ok; a mark at the least that any linear controller leaves with
-        the same sensors.  Right: M_s.
+    Left: payload rms on a logarithmic axis, coloured by shares of its variance, hatched where the
+    design is not ok; if `bound`, a mark at the least that any linear controller leaves with the
+    same sensors.  Right: M_s.
 
     Raises
     ------

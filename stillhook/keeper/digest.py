@@ -27,7 +27,7 @@ _NUMERICAL = ("numpy", "scipy", "casadi", "daqp")
 
 @lru_cache(maxsize=32)
 def code_digest(entry: Callable[..., object] | str) -> str:
-    """Return a digest of the code that the results of a function hang on.
+    """Return a digest of the code that the results of a function, class or module hang on.
 
     That is the file of the function and every file that it imports, directly or through others,
     within the toolkit (and the function's own package): at the top or later, in a function.  What
@@ -35,11 +35,6 @@ def code_digest(entry: Callable[..., object] | str) -> str:
     (`models.basics.lazy`) is looked through to the file that a name comes from.  Of each file the
     syntax tree without its docstrings counts, so that words, comments and line breaks may change;
     and so do the versions of the numerical libraries.
-
-    Parameters
-    ----------
-    entry
-        The function (or class), or the name of its module.
     """
     start = entry if isinstance(entry, str) else entry.__module__
     digest = hashlib.sha256()

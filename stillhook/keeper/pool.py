@@ -54,12 +54,7 @@ class Died:
 class Pool(ABC):
     """Does tasks; a context manager, once begun, that ends the work.
 
-    Attributes
-    ----------
-    name
-        What it is called in a result.
-    jobs
-        How many workers there are.
+    It has a name, for results, and so many `jobs`, its workers.
     """
 
     name: str
@@ -138,10 +133,7 @@ class Pool(ABC):
 class Alone(Pool):
     """One task after the other in this process: for what cannot leave it.
 
-    Parameters
-    ----------
-    progress
-        Called with whatever a task says of how far it is; it may raise KeyboardInterrupt.
+    `progress` is called with whatever a task says of how far it is; it may raise KeyboardInterrupt.
     """
 
     name, jobs = "serial", 1

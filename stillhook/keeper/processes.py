@@ -111,13 +111,7 @@ class _Process:
 
 
 class Processes(Pool):
-    """Processes on this machine.
-
-    Parameters
-    ----------
-    jobs
-        How many; by default one for each core that this process may use.
-    """
+    """So many processes on this machine, by default one for each core that this process may use."""
 
     name = "processes"
 

@@ -23,15 +23,7 @@ FORMAT = 1
 def runs_data(
     compared: Sequence[Runs], question: Mapping[str, object] | None = None
 ) -> dict[str, Any]:
-    """Return runs of one or more controllers as plain data.
-
-    Parameters
-    ----------
-    compared
-        Runs of one controller, or of several on the same case and scenario.
-    question
-        What was asked; plain data.
-    """
+    """Return runs of one or more controllers on a case, and what was asked, as plain data."""
     first = compared[0]
     origin = attributes(first[0])
     data: dict[str, Any] = json_data(

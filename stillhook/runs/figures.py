@@ -43,16 +43,8 @@ _SCATTER = 0.16  # of the width of a bar, over which the seeds' dots are spread
 def comparison(compared: Sequence[Runs]) -> Figure:
     """Return what is left of the motion with each controller: bars, intervals, a dot for each seed.
 
-    Parameters
-    ----------
-    compared
-        Runs of the same case and scenario.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Standard deviation of the payload's error [m or mm], logarithmic where controllers differ
-        by more than a factor of ten.
+    Standard deviation of the payload's error [m or mm], logarithmic where controllers differ by
+    more than a factor of ten.
 
     Raises
     ------
@@ -106,17 +98,9 @@ def exceedance(compared: Sequence[Runs]) -> Figure:
 
     A dot is a crest of the payload's motion that was reached once in the time below it.  The dashed
     line is what a Gaussian motion of the same deviation and period would do; the solid line, with
-    its interval at the exposure time, follows from the largest of every twenty minutes.
-
-    Parameters
-    ----------
-    compared
-        Runs in which the payload stays in its place.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Level [m or mm] over the time in which it is reached once.
+    its interval at the exposure time, follows from the largest of every twenty minutes.  Level [m
+    or mm] over the time in which it is reached once, of runs in which the payload stays in its
+    place.
 
     Raises
     ------

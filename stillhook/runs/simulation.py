@@ -33,13 +33,7 @@ from .window import error_of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Series:
-    """Runs that differ in their seed alone, prepared but not yet run.
-
-    Attributes
-    ----------
-    simulation
-        The prepared simulation.
-    """
+    """Runs that differ in their seed alone, prepared but not yet run."""
 
     simulation: Simulation
 

@@ -140,19 +140,8 @@ class Scene:
 def strip(run: Run, scenario: Scenario | None = None) -> Figure:
     """Return pictures of a run at some moments, side by side.
 
-    They are of some waves about the worst moment, or of all of an operation.
-
-    Parameters
-    ----------
-    run
-        The run, with its traces.
-    scenario
-        What was asked of it: says where the water's surface is.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Heights [m] over time [s].
+    They are of some waves about the worst moment, or of all of an operation.  Heights [m] over time
+    [s]; the scenario says where the water's surface is.
 
     Raises
     ------

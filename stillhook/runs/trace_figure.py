@@ -55,19 +55,9 @@ class _Panel:
 
 @drawn
 def traces(run: Run, window: Window | None = None) -> Figure:
-    """Return the time traces of a run.
+    """Return the time traces of a run: on the left the whole of it, on the right a window.
 
-    Parameters
-    ----------
-    run
-        The run, with its traces.
-    window
-        What to show on the right; by default `stillhook.runs.window.window_of`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A row for each panel; on the left the whole run, on the right the window.
+    That is by default `stillhook.runs.window.window_of`.
 
     Raises
     ------

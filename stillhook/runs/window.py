@@ -62,18 +62,11 @@ def whole_of(run: Run) -> Window:
 
 
 def window_of(run: Run, length: float = LENGTH) -> Window:
-    """Return the part of a run to look at closely.
+    """Return the part of a run to look at closely, so long [s]; a shorter run is taken whole.
 
     Around the first touchdown if there is one; else around the first thing that went wrong: a
     fault, the end of the drum's travel, loss of lock; else around the largest error, once the run
     has settled.
-
-    Parameters
-    ----------
-    run
-        The run, with its traces.
-    length
-        Length of the window [s]; a shorter run is taken whole.
     """
     if run.time.size == 0:
         return Window(start=0.0, end=0.0, why="nothing")
@@ -99,19 +92,10 @@ def window_of(run: Run, length: float = LENGTH) -> Window:
 
 
 def envelope(time: FloatArray, values: FloatArray, bins: int) -> tuple[FloatArray, ...]:
-    """Return times, lowest and highest values of a signal over equal parts of its samples.
+    """Return times, lowest and highest values of a signal over `bins` parts of its samples (m,).
 
-    Parameters
-    ----------
-    time, values
-        The samples (n,).
-    bins
-        Number of parts; with less than two samples to a part all samples are returned.
-
-    Returns
-    -------
-    tuple of FloatArray
-        Times, lowest values, highest values (m,), NaN left out where there are others.
+    With less than two samples (n,) to a part all are returned.  NaN is left out where there are
+    others.
     """
     each = time.size // bins
     if each < 2:

@@ -57,11 +57,6 @@ def motion_figure(survey: HookSurvey) -> Figure:
     """Return the rope speed that follows the hook, over heading and peak period.
 
     A case with one heave RAO has no headings: then it is all three motions over the peak period.
-
-    Parameters
-    ----------
-    survey
-        The motion.
     """
     return _by_heading(survey) if survey.headings.size > 2 else _by_period(survey)
 
@@ -70,10 +65,7 @@ def motion_figure(survey: HookSurvey) -> Figure:
 def spectra_figure(survey: HookSurvey) -> Figure:
     """Return the spectra of the hook's displacement, velocity and acceleration.
 
-    Parameters
-    ----------
-    survey
-        The motion; its case as it stands, and the same across the ship.
+    Those of the case as it stands, and the same across the ship.
     """
     case = survey.case
     hooks = [("hook", HookMotion.from_case(case, warn=False))]

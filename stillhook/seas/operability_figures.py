@@ -156,13 +156,7 @@ _HELD = (0, (2, 1))  # dashes of the drum held
 
 @drawn
 def contour_figure(study: Operability) -> Figure:
-    """Return H_s over T_p: a line for each limit, what is workable shaded, and the drum held.
-
-    Parameters
-    ----------
-    study
-        The study.
-    """
+    """Return H_s over T_p: a line for each limit, what is workable shaded, and the drum held."""
     at = study.depths[0]
     contour = at.main
     h = study.own_heading(contour)
@@ -193,13 +187,7 @@ def contour_figure(study: Operability) -> Figure:
 
 @drawn
 def capability_figure(study: Operability) -> Figure:
-    """Return the winch maker's lines, heave height over period, with what the sea asks for.
-
-    Parameters
-    ----------
-    study
-        The study.
-    """
+    """Return the winch maker's lines, heave height over period, with what the sea asks for."""
     at = study.depths[0]
     lines, contour = at.capability, at.main
     h = study.own_heading(contour)
@@ -238,13 +226,7 @@ def capability_figure(study: Operability) -> Figure:
 
 @drawn
 def depth_figure(study: Operability) -> Figure:
-    """Return the contours at all lengths of rope, with the drum held and with the design.
-
-    Parameters
-    ----------
-    study
-        The study.
-    """
+    """Return the contours at all lengths of rope, with the drum held and with the design."""
     import matplotlib as mpl
 
     h = study.own_heading(study.depths[0].main)
@@ -289,13 +271,7 @@ def _finding(study: Operability, at: AtDepth, h: int) -> str:
 
 @drawn
 def heading_figure(study: Operability) -> Figure:
-    """Return two roses over heading, the bow up: the limiting H_s, and the limit that binds.
-
-    Parameters
-    ----------
-    study
-        The study, of a vessel with headings.
-    """
+    """Return two roses over heading, the bow up: the limiting H_s, and the limit that binds."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
     from matplotlib.ticker import MaxNLocator
@@ -342,13 +318,7 @@ def heading_figure(study: Operability) -> Figure:
 
 @drawn
 def scatter_figure(study: Operability) -> Figure:
-    """Return the scatter diagram with the limits across it, and the share of each month if known.
-
-    Parameters
-    ----------
-    study
-        The study, with a scatter diagram.
-    """
+    """Return the scatter diagram, the limits across it, and the share of each month if known."""
     at = study.depths[0]
     scatter = study.scatter
     assert scatter is not None

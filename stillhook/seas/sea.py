@@ -84,15 +84,7 @@ def scatter_figure(
 
 @drawn
 def spectrum_figure(sea: SeaSpectrum, *, name: str) -> Figure:
-    """Return a spectrum, beside the Bretschneider form of the same H_s and T_p.
-
-    Parameters
-    ----------
-    sea
-        The sea.
-    name
-        What it is, for the line under the title.
-    """
+    """Return a spectrum, beside the Bretschneider form of the same H_s and T_p."""
     peak, height = sea.peak_frequency, sea.significant_height
     period = 2.0 * math.pi / peak
     low, high = sea.band

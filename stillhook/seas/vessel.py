@@ -47,13 +47,7 @@ _FAINT = 0.02  # of a motion's largest amplitude, below which its phase says not
 
 @drawn
 def rao_figure(raos: VesselRaos) -> Figure:
-    """Return amplitudes over frequency above phases, for the headings nearest 0, 45, .. 180 deg.
-
-    Parameters
-    ----------
-    raos
-        The vessel.
-    """
+    """Return amplitudes over frequency above phases, for the headings nearest 0, 45, .. 180 deg."""
     columns = _columns(raos)
     figure = new_figure(9.6, 9.2)
     # Twelve panels in known places: to let matplotlib find them takes a second for each file.
@@ -230,13 +224,7 @@ def _panel(top: Axes, below: Axes, raos: VesselRaos, mode: str, columns: list[in
 
 @drawn
 def hull_figure(vessel: HullVessel) -> Figure:
-    """Return the panels of a hull in three views, with its centres.
-
-    Parameters
-    ----------
-    vessel
-        A hull and its loading.
-    """
+    """Return the panels of a hull in three views, with its centres."""
     panels = vessel.hull.panels
     middle = 0.5 * (panels[..., 0].max() + panels[..., 0].min())
     fore = panels[..., 0].mean(axis=1) > middle

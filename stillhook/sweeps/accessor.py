@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 
 @xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]
 class SweepAccessor:
-    """What can be asked of the result of a sweep.
-
-    Parameters
-    ----------
-    result
-        What `sh.sweep` returned.
-    """
+    """What can be asked of the result of a sweep, of what `sh.sweep` returned."""
 
     def __init__(self, result: xr.Dataset) -> None:
         self._result = result

@@ -48,13 +48,8 @@ def check_writable(path: str | Path) -> Path:
 def write_result(result: xr.Dataset, path: str | Path) -> Path:
     """Write a result, whole or not at all.
 
-    Parameters
-    ----------
-    result
-        What `sh.sweep` returned.
-    path
-        Ends in ``.csv``, ``.parquet``, ``.nc`` or ``.zarr``.  A table has a first line with the
-        names; units are in the metadata of Parquet, NetCDF and Zarr.
+    The path ends in ``.csv``, ``.parquet``, ``.nc`` or ``.zarr``.  A table has a first line with
+    the names; units are in the metadata of Parquet, NetCDF and Zarr.
 
     Raises
     ------

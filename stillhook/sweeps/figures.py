@@ -54,12 +54,7 @@ _DIGITS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # marks of a logarithmic axis
 def sweep_figures(result: xr.Dataset, design: Design | None = None) -> dict[str, Figure]:
     """Return every figure that a result has, by the name of its file.
 
-    Parameters
-    ----------
-    result
-        What a sweep returned.
-    design
-        The design it is about; without it the nominal values and the Nyquist cloud are missing.
+    Without the design that it is about the nominal values and the Nyquist cloud are missing.
     """
     found = {"scatter": scatter_matrix(result)}
     if stable_of(result).sum() > 1:
@@ -185,13 +180,8 @@ def cumulative_share(
 def scatter_matrix(result: xr.Dataset, names: Sequence[str] | None = None) -> Figure:
     """Return every pair of what varied and what came of it.
 
-    Parameters
-    ----------
-    result
-        What a sweep returned.
-    names
-        Coordinates and variables; by default what varied, those that the payload's motion hangs
-        on most if there are many, and payload rms and M_s.
+    Names are those of coordinates and variables; by default what varied, those that the payload's
+    motion hangs on most if there are many, and payload rms and M_s.
 
     Raises
     ------
@@ -232,15 +222,7 @@ def scatter_matrix(result: xr.Dataset, names: Sequence[str] | None = None) -> Fi
 
 @drawn
 def nyquist_cloud(result: xr.Dataset, design: Design) -> Figure:
-    """Return the Nyquist curves of many cases around -1, the design's own on top.
-
-    Parameters
-    ----------
-    result
-        What a sweep in the frequency domain returned.
-    design
-        The design.
-    """
+    """Return Nyquist curves of cases in the frequency domain around -1, the design's own on top."""
     from synth.sweeps import FrequencyEngine, spread_of
 
     engine = FrequencyEngine(design, spread_of(result), metrics=[])

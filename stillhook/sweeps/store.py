@@ -147,13 +147,8 @@ def stored_question(store: str | Path) -> tuple[TimeQuestion, Draw]:
 class Results:
     """Results of a sweep, in memory and, if it is kept, in a journal.
 
-    Parameters
-    ----------
-    template
-        The result with nothing in it yet: coordinates, variables along "case", attributes with
-        the header.
-    path
-        Of the journal; None if nothing is kept.
+    The template is the result with nothing in it yet: coordinates, variables along "case",
+    attributes with the header.  Without a path nothing is kept.
 
     Raises
     ------

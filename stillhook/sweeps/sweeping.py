@@ -212,12 +212,7 @@ def resume_sweep(
 ) -> xr.Dataset:
     """Go on with a time-domain sweep that was stopped, from its store alone.
 
-    Parameters
-    ----------
-    store
-        The folder that `sweep` was given.
-    engine, jobs, progress
-        As for `sweep`; another engine than before gives the same numbers.
+    The store is the folder that `sweep` was given; another engine gives the same numbers.
 
     Raises
     ------

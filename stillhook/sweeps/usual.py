@@ -21,13 +21,8 @@ _LATER = 0.02  # how much later the telemetry may be [s]
 def usual_spread(case: Case, mode: str) -> Spread:
     """Return mass +-30 %, stiffness +-20 %, drag +-50 % and a delay of up to 20 ms more.
 
-    Parameters
-    ----------
-    case
-        The nominal case.
-    mode
-        "frequency", where drag is the design's linear coefficient, or "time", where it is the
-        drag coefficient of the payload.
+    In the mode "frequency" drag is the design's linear coefficient, in "time" the drag coefficient
+    of the payload.
     """
     delay = float(case.sensors.telemetry.delay)
     drag = "drag" if mode == "frequency" else "payload.drag_coefficient"
@@ -74,12 +69,7 @@ with half of its torque or a third of its power for a minute."""
 
 
 def fault_spread(*names: str) -> Spread:
-    """Return the spread of one or several kinds of faults.
-
-    Parameters
-    ----------
-    *names
-        Of `FAULT_SPREADS`.
+    """Return the spread of one or several kinds of faults, by names of `FAULT_SPREADS`.
 
     Raises
     ------

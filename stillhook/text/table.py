@@ -241,12 +241,7 @@ class Report:
 def markdown(item: Report | Table, drawn: Sequence[str] | None = None) -> str:
     """Return a report or a table as Markdown.
 
-    Parameters
-    ----------
-    item
-        The report or the table.
-    drawn
-        Names of the drawings whose files lie beside it; by default all.
+    It shows the drawings named in `drawn`, whose files lie beside it; by default all.
     """
     if isinstance(item, Table):
         return "\n\n".join([_grid(item), *(f"{note}." for note in item.notes)]) + "\n"

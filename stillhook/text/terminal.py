@@ -123,20 +123,10 @@ def commands(rows: Sequence[tuple[str, str]], out: Console) -> None:
 def progress(
     *, shown: bool, pace: Callable[[float], str] | None = None
 ) -> Iterator[Callable[[str, float, float], None]]:
-    """Show a progress bar on standard error while a computation runs.
+    """Show a progress bar on a terminal's standard error; yield what is told (stage, done, total).
 
-    Parameters
-    ----------
-    shown
-        Whether to show it at all; on anything but a terminal it is not shown in any case.
-    pace
-        Words for what is done in a second: shown beside the time that is left.  Otherwise it is the
-        time since the beginning that is shown.
-
-    Yields
-    ------
-    Progress
-        To be called as tell(stage, done, total).
+    `pace` has words for what is done in a second, beside the time that is left; without it the time
+    since the beginning is shown.
     """
     out = console(stderr=True)
     if not (shown and out.is_terminal):

@@ -421,15 +421,7 @@ def _high_order(
 
 
 def exact_sensors(case: Case, measurements: Sequence[str]) -> tuple[str, ...]:
-    """Return the sensors that tell of payload or ship and to which a case gives no noise.
-
-    Parameters
-    ----------
-    case
-        The case.
-    measurements
-        What is heard.
-    """
+    """Return the sensors heard of payload or ship to which a case gives no noise."""
     payload, mru = case.sensors.payload, case.sensors.mru
     noise = {f"payload.{name}": getattr(payload, f"{name}_noise") for name in _SIGNALS}
     of_unit = ("noise_floor", "noise_fraction", "drift", "noise")
@@ -441,14 +433,7 @@ def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:
     """Return the limits on signals as limits on their rms by name; others are left out.
 
     |static| + loss + k sigma <= bound with k = sqrt(2 ln(T/T_z)), and sqrt(static^2 + loss^2 +
-    sigma^2) <= bound.
-
-    Parameters
-    ----------
-    limits
-        As of a case.
-    period
-        T_z of the signals [s].
+    sigma^2) <= bound.  T_z is the signals' period [s].
 
     Raises
     ------

@@ -90,10 +90,7 @@ class SpectralFactor:
     ) -> SpectralFactor:
         """Return the factor that minimises sum(weights (density - target)^2), from this one.
 
-        Parameters
-        ----------
-        omega, target, weights
-            Nodes [rad/s], the true density and weights there, (k,) each.
+        Nodes [rad/s], the true density and weights there are (k,) each.
         """
         x, scale = omega / self.peak, self.variance / self.peak
         root = np.sqrt(weights) * scale
@@ -118,12 +115,8 @@ class SpectralFactor:
 def spectral_factor(disturbance: Disturbance, order: int = 8) -> SpectralFactor:
     """Return the filter whose response to white noise has about a disturbance's spectrum.
 
-    Parameters
-    ----------
-    disturbance
-        Not white.
-    order
-        Number of states, even, 2 to 12; fewer where they are enough.
+    It has `order` states, even, 2 to 12, or fewer where they are enough; the disturbance is not
+    white.
 
     Raises
     ------

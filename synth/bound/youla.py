@@ -93,12 +93,7 @@ def realised_basis(poles: FloatArray, channels: int) -> tuple[FloatArray, FloatA
 class AffineLoop:
     """Responses of the closed loop that are affine in Q.
 
-    Parameters
-    ----------
-    bound
-        The question, with its observer and state feedback.
-    poles
-        Of the functions of which Q is made, for each measurement [1/s], (count,).
+    `poles` are those of the functions of which Q is made, for each measurement [1/s], (count,).
     """
 
     def __init__(self, bound: Bound, poles: FloatArray) -> None:
@@ -218,13 +213,9 @@ class YoulaDesign:
 class Truth:
     """The plant on which a loop has to hold.
 
-    Attributes
-    ----------
-    plant
-        With the command and the measurements of the loop and exact delays; its poles count.
-    line
-        From frequencies [rad/s], (k,), to the exact responses of the measurements to the command,
-        (k, ny); by default the plant's.
+    Its command and measurements are those of the loop, with exact delays; its poles count.  `line`
+    leads from frequencies [rad/s], (k,), to the exact responses of the measurements to the command,
+    (k, ny); by default the plant's.
     """
 
     plant: LinearPlant

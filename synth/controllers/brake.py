@@ -16,14 +16,8 @@ class BrakeOn(RecursiveController):
     """No compensation at all: the brake is on and the drive is off.
 
     Zero is no voltage, no speed and no torque, whichever the drive is told: a standing motor then
-    carries nothing and stays cold.
-
-    Parameters
-    ----------
-    case
-        The case; nothing of it is needed, but every controller is made from one.
-    sample_time
-        T [s].
+    carries nothing and stays cold.  A sample lasts T [s].  Nothing of the case is needed, but every
+    controller is made from one.
 
     Raises
     ------

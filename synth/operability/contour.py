@@ -70,12 +70,8 @@ class Contour:
     def at(self, periods: npt.ArrayLike, headings: npt.ArrayLike | None = None) -> FloatArray:
         """Return the limiting H_s between the points of the contour [m], linear in both.
 
-        Parameters
-        ----------
-        periods
-            Peak periods (n,) [s].  Beyond the ends of the contour nothing is known: NaN.
-        headings
-            Headings (n,) [rad]; None takes the best of the contour at each period.
+        Beyond the ends of the periods (n,) [s] nothing is known: NaN.  Without headings (n,) [rad]
+        it is the best of the contour at each period.
 
         Raises
         ------
@@ -112,14 +108,9 @@ class Contour:
 
 
 def heading_shares(axis: FloatArray | None, headings: npt.ArrayLike) -> FloatArray:
-    """Return what each heading of an axis counts at the headings wanted, linear between (h, n).
+    """Return what each heading of an axis, ascending (h,) [rad], counts at others, (h, n).
 
-    Parameters
-    ----------
-    axis
-        Headings, ascending (h,) [rad].
-    headings
-        Headings (n,) [rad].
+    Between them it is linear.
 
     Raises
     ------

@@ -106,14 +106,7 @@ def case_criteria(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
     """Return the limits of motor, drive and rope of a case, whether it enforces them or not.
 
     Where the least tension is no limit (`limits.tension_ends` is ``drum`` and none is given), the
-    rope must not go slack at the drum: its bound is zero.
-
-    Parameters
-    ----------
-    case
-        The case.
-    plant
-        Its plant, for the static values.
+    rope must not go slack at the drum: its bound is zero.  The plant is for the static values.
     """
     # A load at rest that breaks a limit is no error here: the limiting H_s is then zero.
     limits = list(drive_limits(case.variant({"limits.drive": "report"}), plant))

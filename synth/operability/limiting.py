@@ -43,13 +43,7 @@ _BROKEN = 10.0  # excess of what is broken beyond measure
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SeaStates:
-    """A system in the seas of a column, at any H_s: drag, variances, all at once.
-
-    Attributes
-    ----------
-    system, column
-        What is moved, and by which seas.
-    """
+    """A system in the seas of a column, at any H_s: drag, variances, all at once."""
 
     system: System
     column: SeaColumn
@@ -288,12 +282,9 @@ def _excesses(
 
 
 def _unsettled(sizes: FloatArray, excess: FloatArray) -> FloatArray:
-    """Return the middles of intervals in which a criterion may break unseen, (m,).
+    """Return the middles of intervals in which a criterion may break unseen, (m,), by log H_s (n,).
 
-    Parameters
-    ----------
-    sizes, excess
-        Logarithms of H_s (n,), and the excess of each criterion at them (c, n).
+    The excess of each criterion there is (c, n).
     """
     n = sizes.size
     excess = np.minimum(excess, 1.0)

@@ -181,14 +181,9 @@ class DragResponses:
     ) -> list[FloatArray]:
         """Return what `variance` sums up of the velocity and of the motor's speed, (r, n) each.
 
-        The first does not depend on the drag, nor the other on the losses.
-
-        Parameters
-        ----------
-        densities
-            One-sided densities of the disturbances at the nodes, each (r, n) or (1, n).
-        coefficients
-            Of drag [N s/m] and of losses [N m s/rad], (r,) each.
+        The first does not depend on the drag, nor the other on the losses.  Densities of the
+        disturbances at the nodes are one-sided, (r, n) or (1, n) each; coefficients are of drag [N
+        s/m] and of losses [N m s/rad], (r,) each.
         """
         o, w = len(self.outputs), self.table.shape[1] - 1 - self.losses
         t, rows = self.table, [self.table[o, :w]]
@@ -207,29 +202,13 @@ class DragResponses:
         ]
 
     def variance(self, weighted: FloatArray, coefficients: Sequence[FloatArray]) -> FloatArray:
-        """Return the variance of a speed (r,).
-
-        Parameters
-        ----------
-        weighted
-            Of :meth:`weighted_speeds`, (r, n).
-        coefficients
-            Of drag [N s/m] and of losses [N m s/rad], (r,) each.
-        """
+        """Return the variance of a speed (r,) of :meth:`weighted_speeds` (r, n)."""
         return np.asarray((weighted / self._denominator(coefficients)).sum(axis=1))
 
     def moments(
         self, densities: Sequence[FloatArray], coefficients: Sequence[FloatArray]
     ) -> SeaMoments:
-        """Return the moments of every output.
-
-        Parameters
-        ----------
-        densities
-            One-sided densities of the disturbances at the nodes, each (r, n) or (1, n).
-        coefficients
-            Of drag [N s/m] and of losses [N m s/rad], (r,) each.
-        """
+        """Return the moments of every output; arguments are as in `weighted_speeds`."""
         rows, count = coefficients[0].size, len(self.outputs)
         weights = self.nodes.weights / self._denominator(coefficients)  # (r, n)
         factors = list(combinations_with_replacement(self._factors(coefficients), 2))

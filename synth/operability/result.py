@@ -153,17 +153,9 @@ class Operability:
         return f"M_s {value}, {'above' if over else 'within'} its limit {bound:g}"
 
     def verify(self, count: int = _CHECKS) -> tuple[ContourCheck, ...]:
-        """Evaluate the design at points of its contour once more, by single evaluations.
+        """Evaluate the design at points of its contour once more, so many at each length of rope.
 
-        Parameters
-        ----------
-        count
-            Points at each length of rope.
-
-        Returns
-        -------
-        tuple
-            Each `ok` where the binding limit is met to 1e-6; empty without a design.
+        Each is `ok` where the binding limit is met to 1e-6; without a design there are none.
         """
         if self.design is None:
             return ()

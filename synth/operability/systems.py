@@ -170,15 +170,10 @@ class System(ABC):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopSystem(System):
-    """A plant with a linear controller around it.
+    """A plant that holds the drag `DragElement.reference`, with a linear controller around it.
 
-    Attributes
-    ----------
-    plant, controller
-        The two ends of the loop; the plant holds the drag `DragElement.reference`.
-    drag
-        Quadratic drag, or None where the plant holds a fixed coefficient.  Of losses it holds none:
-        what is stable without them counts as stable.
+    `drag` is quadratic, or None where the plant holds a fixed coefficient.  Of losses it holds
+    none: what is stable without them counts as stable.
     """
 
     plant: LinearPlant

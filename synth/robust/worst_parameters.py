@@ -230,13 +230,6 @@ def robustness(
 class _Box:
     """The ranges as a box: a point has a number from -1 to 1 for each, more beyond its range.
 
-    Parameters
-    ----------
-    design
-        The design.
-    uncertainty
-        Share or width of each, by path.
-
     Raises
     ------
     InputError

@@ -30,20 +30,10 @@ class StepError(ArithmeticError):
 def derivative(
     function: Callable[[float], npt.NDArray[np.generic]], at: float
 ) -> npt.NDArray[np.generic]:
-    """Return the derivative of a function of one number, of fourth order.
+    """Return the derivative of a function of one number, of fourth order, shaped as its value.
 
-    Parameters
-    ----------
-    function
-        From the number to an array; it may refuse values (`InputError`) on one side of `at`,
-        where a range ends: then the differences are one-sided, of the same order.
-    at
-        Where; not zero, as the step is a share of it.
-
-    Returns
-    -------
-    numpy.ndarray
-        In the shape of the function's value.
+    The function may refuse values (`InputError`) on one side of `at`, where a range ends: then the
+    differences are one-sided, of the same order.  The step is a share of `at`.
 
     Raises
     ------
@@ -73,12 +63,7 @@ def sided_derivatives(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives from below and from above, the same but at a corner.
 
-    Parameters
-    ----------
-    function
-        From the number to logarithms, (n,), continuous; as for `derivative` it may refuse a side.
-    at
-        Where; not zero.
+    The function gives logarithms, (n,), continuous; as for `derivative` it may refuse a side.
 
     Raises
     ------

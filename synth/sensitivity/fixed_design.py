@@ -76,13 +76,7 @@ class FixedDesign:
         return self.case.payload.fixed_drag or 0.0
 
     def assessment(self, shaken: Case | None = None) -> Assessment | None:
-        """Return the closed loop; None if it is unstable.
-
-        Parameters
-        ----------
-        shaken
-            The case whose sea and vessel shake it; its own by default.
-        """
+        """Return the closed loop, shaken by its own or another case's sea; None if unstable."""
         shaken = shaken or self.case
         hook = HookMotion.from_case(shaken, warn=False)
         spectra = heard_spectra(shaken, hook, self.design.measurements)

@@ -31,24 +31,11 @@ _FEWEST = 32  # base points without which an index means nothing
 def evaluate_rows(
     design: Design, spread: Spread, figure: str, progress: Progress | None
 ) -> tuple[Spread, Evaluate]:
-    """Return the spread in plain numbers, and a function from rows to a figure.
+    """Return the spread on the design's case in SI, and a function from rows (n, d) to a figure.
 
-    Parameters
-    ----------
-    design, spread
-        The design and the ranges.
-    figure
-        A variable of `synth.sweeps.frequency.frequency_sweep`, or ``modulus_margin``, 1/M_s: near
-        the edge of stability M_s is all tail, and its variance that of a few cases.
-    progress
-        Called with a word, the cases done and their count.
-
-    Returns
-    -------
-    Spread
-        The spread on the design's case.
-    Callable
-        From rows (n, d) to the figure (n,), NaN where the loop is unstable.
+    That is (n,), NaN where the loop is unstable.  The figure is a variable of
+    `synth.sweeps.frequency.frequency_sweep`, or ``modulus_margin``, 1/M_s: near the edge of
+    stability M_s is all tail, and its variance that of a few cases.
 
     Raises
     ------

@@ -129,14 +129,9 @@ class Sensitivity:
         return FixedDesign.of(self.design)
 
     def moved(self, share: float = 0.1, paths: Sequence[str] | None = None) -> tuple[Moved, ...]:
-        """Recompute the design with numbers moved one at a time.
+        """Recompute the design with numbers, by default the gains, moved one at a time by a share.
 
-        Parameters
-        ----------
-        share
-            By which share [-]; the thesis's Figure 32 has 0.1.
-        paths
-            Which; by default the gains, as in that figure.
+        The thesis's Figure 32 has 0.1.
 
         Raises
         ------

@@ -74,14 +74,9 @@ class ChosenMotor:
 def read_catalogue(
     motors: str | Path | Sequence[Mapping[str, Any]], case: Case
 ) -> tuple[CatalogueMotor, ...]:
-    """Return the motors of a catalogue, the smallest rated power first.
+    """Return the motors of a CSV file or of rows, the smallest rated power first.
 
-    Parameters
-    ----------
-    motors
-        A CSV file, or rows as mappings.
-    case
-        The case that they are for; they must be of its kind, AC or DC.
+    They must be of the kind of the case's own, AC or DC.
 
     Raises
     ------

@@ -47,12 +47,8 @@ def asked_by(case: Case, question: DesignQuestion) -> Problem:
 class Answer:
     """An optimum and what its neighbours need of it.
 
-    Attributes
-    ----------
-    problem, solved, assessment
-        The problem, the solver's answer, and its assessment.
-    excess
-        Largest relative excess over a limit that was to be kept; at most `synth.search.KEPT`.
+    `excess` is the largest relative excess over a limit that was to be kept, at most
+    `synth.search.KEPT`.
     """
 
     problem: Problem

@@ -64,14 +64,7 @@ class MotorData:
 
 
 def motor_changes(case: Case, scale: float) -> dict[str, float]:
-    """Return the changes by dotted path that make a case's motor `scale` times as large.
-
-    Parameters
-    ----------
-    case
-        The case, its motor the one of scale 1.
-    scale
-        Continuous torque over that of the case's motor.
+    """Return the changes by dotted path that make a case's motor `scale` times as large, by torque.
 
     Raises
     ------

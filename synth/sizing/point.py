@@ -220,13 +220,8 @@ def _stopped(problem: Problem, near: Answer, gear: float) -> SizePoint:
 def target_of(target: float | str, hook_rms: float) -> float:
     """Return a target as an rms of the payload [m].
 
-    Parameters
-    ----------
-    target
-        A number in metres, a text with a unit of length (``20 mm``), with ``%`` of the hook's
-        rms motion, or with ``dB`` below it.
-    hook_rms
-        Of the hook [m].
+    It is a number in metres, a text with a unit of length (``20 mm``), with ``%`` of the hook's rms
+    motion [m], or with ``dB`` below it.
 
     Raises
     ------

@@ -362,15 +362,7 @@ def _with_choice(
 
 
 def _why_not(sizing: Sizing, free: Answer) -> str:
-    """Return why no motor meets the target.
-
-    Parameters
-    ----------
-    sizing
-        One without a motor.
-    free
-        The optimum without a motor's limits.
-    """
+    """Return why no motor meets the target, from the optimum without a motor's limits."""
     if sizing.unlimited_rms > sizing.target:
         binding = [n for n, use in free.uses().items() if use > 1.0 - 5e-3]
         binding.sort(key=lambda n: -abs(free.prices[n]))

@@ -138,12 +138,7 @@ class ChainLoops:
     def responses(self, rows: IndexArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return closed and open characteristic functions of some loops, (m, k) each.
 
-        Parameters
-        ----------
-        rows
-            Which loops, (m,).
-        s
-            Points [1/s], (m, k) or (k,).
+        Points s are (m, k) or (k,) [1/s].
         """
         step = max(1, BLOCK // s.shape[-1])
         if s.ndim == 1 and rows.size > step:
@@ -170,14 +165,8 @@ class Chain:
     """What responses of some loops are made of; the module's docstring has the letters.
 
     All are (1 or m, 1 or k).  y and f are without a force at the payload and per unit of it; the
-    force is `per_mass` times the mass there, and `per_drag` times the drag.
-
-    Parameters
-    ----------
-    loops, rows
-        The loops, and which of them, (m,).
-    s
-        Points [1/s], (m, k) or (k,).
+    force is `per_mass` times the mass there, and `per_drag` times the drag.  `rows` are which of
+    the loops, (m,); points s are (m, k) or (k,) [1/s].
     """
 
     def __init__(self, loops: ChainLoops, rows: IndexArray, s: ComplexArray) -> None:
@@ -382,12 +371,7 @@ class Chain:
     ) -> dict[str, FloatArray]:
         """Return variances of outputs, then of their rates, by all rules, (m, 2 rules) each.
 
-        Parameters
-        ----------
-        outputs, nodes, shaken
-            Names of outputs, the nodes, which `s` is of, and what shakes the loops.
-        drag
-            Their drag coefficients, (m,) [N s/m].
+        `s` is of the nodes; the loops' drag coefficients are (m,) [N s/m].
         """
         y, f = self.ends(drag[:, None])
         inverse = 1.0 / abs2(self.closed(y, f))

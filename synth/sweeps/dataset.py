@@ -120,16 +120,9 @@ def law_of(dataset: xr.Dataset, number: int) -> tuple[str, dict[str, float]]:
 
 
 def case_of(dataset: xr.Dataset, number: int) -> Case:
-    """Return the case of one entry along "case", its gains in it where they are the three.
+    """Return the case of one entry, a value of "case", its gains in it where they are the three.
 
     Faults, which are no part of a case, are left out.
-
-    Parameters
-    ----------
-    dataset
-        A sweep's dataset, or a part of it.
-    number
-        The case's number, a value of the coordinate "case".
 
     Raises
     ------

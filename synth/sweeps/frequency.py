@@ -106,14 +106,8 @@ class FrequencyEngine:
     ) -> dict[str, FloatArray | BoolArray]:
         """Return ``stable`` and the metrics of rows, (n,) each; NaN where a loop is unstable.
 
-        A row's numbers do not depend on the rows beside it, but for the last digits.
-
-        Parameters
-        ----------
-        rows
-            Values in SI, (n, d), in the order of `spread.paths`.
-        progress
-            Called as progress(stage, done, total).
+        A row's numbers do not depend on the rows beside it, but for the last digits.  Their values
+        are SI, (n, d), in the order of `spread.paths`.
 
         Raises
         ------

@@ -101,12 +101,7 @@ class SpringLoops:
     ) -> dict[str, FloatArray]:
         """Return variances of outputs, and of their rates, by all rules, (n, orders, rules) each.
 
-        Parameters
-        ----------
-        orders
-            By output: 2 with its rate, 1 without.
-        nodes, shaken
-            The nodes, and what shakes the loops, without noise.
+        An output's order is 2 with its rate, 1 without; what shakes the loops is without noise.
         """
         # Every variance is sum_m c_m int omega^2m S / |Den|^2, c_m of the output's |numerator|^2:
         # so 1/|Den|^2 is made once, and multiplied once with all powers, weights and rules.
@@ -199,14 +194,10 @@ def squared(columns: Columns) -> Columns:
 def hurwitz(columns: Columns) -> BoolArray:
     """Return whether all roots of polynomials lie in the open left half plane, (n,).
 
-    Routh's array, all loops at once, with time scaled by the roots' geometric mean so that
-    nothing overflows (Routh 1877; for the fourth order it is Lienard and Chipart's pair of
-    inequalities).  A zero in its first column, the boundary, counts as unstable.
-
-    Parameters
-    ----------
-    columns
-        Coefficients of s^0 to s^m, each (n,); the highest not zero.
+    Routh's array, all loops at once, with time scaled by the roots' geometric mean so that nothing
+    overflows (Routh 1877; for the fourth order it is Lienard and Chipart's pair of inequalities).
+    A zero in its first column, the boundary, counts as unstable.  The columns are the coefficients
+    of s^0 to s^m, each (n,), the highest not zero.
     """
     degree = len(columns) - 1
     sign = np.sign(columns[-1])

@@ -74,15 +74,7 @@ class LawColumns:
 
 
 class DesignLaw:
-    """A structure with its parameters, asked about rows of a spread.
-
-    Parameters
-    ----------
-    question
-        The structure on the plant that it is bound to.
-    parameters
-        Its parameters by name.
-    """
+    """A structure, bound to its plant, with its parameters, asked about rows of a spread."""
 
     def __init__(self, question: DesignQuestion, parameters: Mapping[str, float]) -> None:
         self.law, self.amplifier = question.law, question.amplifier or 1.0

@@ -106,12 +106,7 @@ def finished(
 ) -> dict[str, FloatArray]:
     """Return metrics of loops, (n,) each; NaN where a loop is unstable.
 
-    Parameters
-    ----------
-    metrics, loops
-        What is wanted, and what it is made of.
-    exposure
-        Time whose most probable extremes are taken [s], `Limits.equivalent_exposure`.
+    Most probable extremes are those of the exposure [s], `Limits.equivalent_exposure`.
     """
     static, loss = loops.at_rest, loops.loss
     alone = {

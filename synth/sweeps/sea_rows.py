@@ -25,13 +25,7 @@ _PROBES = np.geomspace(0.05, 50.0, 60)
 
 
 class SeaRows:
-    """Densities of the hook's motion of a spread's rows.
-
-    Parameters
-    ----------
-    case, spread
-        The case, and the spread on it.
-    """
+    """Densities of the hook's motion of the rows of a spread on a case."""
 
     def __init__(self, case: Case, spread: Spread) -> None:
         self.spread = spread

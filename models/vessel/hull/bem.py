@@ -205,13 +205,9 @@ def waterplane_lid(hull: Hull) -> FloatArray | None:
 
     Panels on the inner water settle what happens at irregular frequencies if they cover it whole:
     with gaps along the hull, as a lid of squares has them, the first of those frequencies still
-    show.  So the lid is spanned between the two sides of the waterline.
-
-    Parameters
-    ----------
-    hull
-        One whose waterline is cut twice by every line across the ship; not so for a catamaran,
-        a moonpool or a hull that is wholly submerged.
+    show.  So the lid is spanned between the two sides of the waterline.  A simple one is cut twice
+    by every line across the ship; not so for a catamaran, a moonpool or a hull that is wholly
+    submerged.
     """
     segments = _waterline(hull)
     if not len(segments):

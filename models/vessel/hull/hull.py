@@ -129,31 +129,21 @@ class Hull:
 
 
 def volumes(panels: FloatArray) -> FloatArray:
-    """Return the enclosed volume three times, from panels facing along x, y and z [m3].
+    """Return the enclosed volume three times, from panels (n, 4, 3) facing along x, y and z [m3].
 
     By the divergence theorem the integrals of x n_x, y n_y and z n_z over a closed surface are
     each its volume.  The missing waterplane at z = 0 adds to none of them.
-
-    Parameters
-    ----------
-    panels
-        Corners (n, 4, 3) [m].
     """
     points, normals = quadrature_rule(panels)
     return np.asarray((points * normals).sum(axis=0))
 
 
 def quadrature_rule(panels: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return points (q, 3) and outward normals times weights (q, 3) of integrals over panels.
+    """Return points (q, 3), and outward normals times weights (q, 3), of integrals over panels.
 
     Each panel is two flat triangles, in the mean over both ways to cut it, so that mirrored panels
     have mirrored integrals.  The rule with the middles of a triangle's edges is exact for
     polynomials up to the second degree.
-
-    Parameters
-    ----------
-    panels
-        Corners (n, 4, 3) [m].
     """
     points, normals = [], []
     for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)):
@@ -172,18 +162,9 @@ def panel_areas(panels: FloatArray) -> FloatArray:
 
 
 def patch(points: FloatArray) -> FloatArray:
-    """Return the panels of a grid of points.
+    """Return the panels (n, 4, 3) of a grid of points (r, c, 3) [m], those without area left out.
 
-    Parameters
-    ----------
-    points
-        (r, c, 3) [m]; with rows counted downwards and columns to the right on the page, the panels
-        look at the reader.
-
-    Returns
-    -------
-    FloatArray
-        Corners ((r - 1) (c - 1), 4, 3), those without area left out.
+    With rows counted downwards and columns to the right on the page, they look at the reader.
     """
     panels = np.stack(
         [points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]], axis=2

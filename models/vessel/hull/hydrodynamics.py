@@ -98,12 +98,7 @@ class Hydrodynamics(ReadOnlyArrays):
         super().__post_init__()
 
     def resampled(self, omega: npt.ArrayLike) -> Hydrodynamics:
-        """Return the coefficients at other frequencies, by cubic splines.
-
-        Parameters
-        ----------
-        omega
-            Frequencies within the table's range (n,) [rad/s].
+        """Return the coefficients at other frequencies (n,) [rad/s], by cubic splines.
 
         Raises
         ------
@@ -134,15 +129,11 @@ class Hydrodynamics(ReadOnlyArrays):
 
             B_ii = k / (8 pi rho g c_g) integral of |F_i|^2 over headings,
 
-        while here one comes from radiation and the other from diffraction: their difference is
-        that of the panels from a smooth hull.  The largest is returned of heave, roll and pitch,
-        over the largest damping of that motion.  Headings must be all round; frequencies whose
-        forces turn too fast with heading are left out.
-
-        Parameters
-        ----------
-        roll_damping
-            Damping of roll beside that of the waves [N m s], part of what roll is measured by.
+        while here one comes from radiation and the other from diffraction: their difference is that
+        of the panels from a smooth hull.  The largest is returned of heave, roll and pitch, over
+        the largest damping of that motion.  Headings must be all round; frequencies whose forces
+        turn too fast with heading are left out.  `roll_damping` is what roll has beside that of the
+        waves [N m s], part of what it is measured by.
         """
         step = np.diff(self.heading)
         if self.heading.size < 8 or np.ptp(step) > 1e-6 or math.isfinite(self.depth):
@@ -235,10 +226,7 @@ class FloatingBody(ReadOnlyArrays):
     def motions(self, omega: npt.ArrayLike | None = None) -> ComplexArray:
         """Return the motions of `hydrodynamics.point` per metre of wave (k, h, 6).
 
-        Parameters
-        ----------
-        omega
-            Frequencies [rad/s]; those of the coefficients if left out.
+        At frequencies [rad/s], those of the coefficients if left out.
         """
         water = self.hydrodynamics
         if omega is not None:

@@ -185,16 +185,9 @@ class Loading:
 
 
 def moved(matrix: FloatArray, origin: Point, point: Point) -> FloatArray:
-    """Return a matrix of mass, damping or stiffness that held about `origin`, about `point`.
+    """Return a matrix (..., 6, 6) of mass, damping or stiffness about another point [m].
 
     A congruence T' M T, with x_origin = T x_point; forces then move along with motions.
-
-    Parameters
-    ----------
-    matrix
-        (..., 6, 6).
-    origin, point
-        The two points [m].
     """
     arm = (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])
     T = transport(arm)

@@ -87,14 +87,7 @@ class ShipLines:
         check_range("ship", "transom_depth", self.transom_depth, low=0.05, high=1.0)
 
     def hull(self, *, panels: int = 400, name: str | None = None) -> Hull:
-        """Return the wetted surface.
-
-        Parameters
-        ----------
-        panels
-            How many panels, about.
-        name
-            What it is called; after its dimensions if left out.
+        """Return the wetted surface in some `panels`, called after its dimensions by default.
 
         Raises
         ------

@@ -195,17 +195,10 @@ def vessel_from_hull(
 
 
 def usual_frequencies(hull: Hull, low: float = 0.15, high: float = 2.0) -> FloatArray:
-    """Return frequencies for the coefficients of a hull (k,) [rad/s].
+    """Return frequencies for the coefficients of a hull from low to high (k,) [rad/s].
 
     At equal steps of 0.05 rad/s or less, so that the wave's phase at the ends of the hull turns by
     no more than a radian from one to the next: what is between them is interpolated.
-
-    Parameters
-    ----------
-    hull
-        For its length.
-    low, high
-        The first and the last [rad/s].
     """
     step = min(0.05, GRAVITY / (high * hull.length))
     return np.linspace(low, high, max(4, 1 + math.ceil((high - low) / step - 1e-9)))
@@ -216,11 +209,6 @@ def well_spaced(body: FloatingBody) -> FloatArray:
 
     Beginning with those of the coefficients, the middle of two rows is added wherever a motion
     there differs from what straight lines of amplitude and phase would give.
-
-    Parameters
-    ----------
-    body
-        With its coefficients.
     """
     rows = np.array(body.hydrodynamics.omega)
     values = body.motions(rows)

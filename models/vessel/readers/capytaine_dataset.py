@@ -153,12 +153,7 @@ class CapytaineData:
     def table(self, name: str, axes: Sequence[str]) -> npt.NDArray[Any]:
         """Return a variable with its axes in a given order, degrees of freedom as in `dofs`.
 
-        Parameters
-        ----------
-        name
-            The variable.
-        axes
-            Wanted axes; `frequency` stands for the file's own, `dof` for that of the motions.
+        Of the wanted axes `frequency` stands for the file's own, `dof` for that of the motions.
 
         Raises
         ------

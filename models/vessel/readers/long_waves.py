@@ -140,17 +140,9 @@ class LongWaveCheck:
 
 
 def check_long_waves(raos: VesselRaos) -> LongWaveCheck:
-    """Hold the lowest frequency of a table against the limits of long waves.
+    """Hold the lowest frequency of a table in our convention against the limits of long waves.
 
-    Parameters
-    ----------
-    raos
-        The table, in the project's convention.
-
-    Returns
-    -------
-    LongWaveCheck
-        What was found, what was expected, and which mistake would explain the difference.
+    The answer has what was found and expected, and which mistake would explain the difference.
     """
     centred = raos.with_phase_origin(raos.origin[:2])
     omega = float(raos.omega[0])
