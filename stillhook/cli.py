@@ -129,11 +129,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     The arguments are those of the process by default.
 
-    Raises
-    ------
-    SystemExit
-        From the parser: with 0 for ``--help`` and ``--version``, with 2 for arguments that it
-        does not understand.
+    Raises SystemExit from the parser: with 0 for ``--help`` and ``--version``, with 2 for arguments
+    that it does not understand.
     """
     words = sys.argv[1:] if argv is None else argv
     parser = build_parser(words)

@@ -91,10 +91,7 @@ def check_range(
 def check_finite(owner: str, name: str, values: npt.ArrayLike) -> FloatArray:
     """Return `values` as a float array if every entry is finite.
 
-    Raises
-    ------
-    InputError
-        If an entry is NaN or infinite, or is no number; its index is named.
+    Raises InputError if an entry is NaN or infinite, or is no number; its index is named.
     """
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -112,10 +109,7 @@ def check_finite(owner: str, name: str, values: npt.ArrayLike) -> FloatArray:
 def check_ascending(owner: str, name: str, values: Sequence[float] | FloatArray) -> FloatArray:
     """Return `values` as an array if they are finite and strictly ascending.
 
-    Raises
-    ------
-    InputError
-        If two neighbours are equal or in the wrong order; both are named.
+    Raises InputError if two neighbours are equal or in the wrong order; both are named.
     """
     array = check_finite(owner, name, values)
     fault = ascending_fault(array)
@@ -141,10 +135,7 @@ def ascending_fault(values: Sequence[float] | FloatArray) -> str:
 def check_choice(owner: str, name: str, value: object, choices: Collection[str]) -> None:
     """Refuse a value that is none of a few words.
 
-    Raises
-    ------
-    InputError
-        If it is none of them; they are told.
+    Raises InputError if it is none of them; they are told.
     """
     if value not in choices:
         raise InputError(f"{owner}: {name} must be one of {', '.join(choices)}; got {value!r}")
@@ -153,10 +144,7 @@ def check_choice(owner: str, name: str, value: object, choices: Collection[str])
 def check_seed(owner: str, seed: int) -> int:
     """Return the seed if it is a whole number of at least 0.
 
-    Raises
-    ------
-    InputError
-        If it is not.
+    Raises InputError if it is not.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise InputError(f"{owner}: seed must be a whole number of at least 0, got {seed!r}")

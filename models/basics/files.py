@@ -32,10 +32,7 @@ def file_stamp(path: str | Path) -> tuple[int, int]:
 def read_bytes(path: str | Path) -> bytes:
     """Return the contents of a file, unpacked where it is packed with gzip.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it is a folder, is too large or is cut off.
+    Raises InputError if there is no such file, it is a folder, is too large or is cut off.
     """
     place = Path(path)
     try:
@@ -64,10 +61,7 @@ def read_bytes(path: str | Path) -> bytes:
 def read_text(path: str | Path) -> str:
     """Return the contents of a text file in UTF-8 or ASCII.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is no text.
+    Raises InputError if it cannot be read, or is no text.
     """
     raw = read_bytes(path)
     try:
@@ -85,10 +79,7 @@ def replace_atomically(path: str | Path, write: Callable[[Path], object]) -> Pat
     An interrupted run, or a full disk, leaves the old file or the new one, and nothing between.
     The folder of the file must exist.
 
-    Raises
-    ------
-    InputError
-        If the folder does not exist, cannot be written to, or is full.
+    Raises InputError if the folder does not exist, cannot be written to, or is full.
     """
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")

@@ -51,10 +51,7 @@ def check_hdf5(path: str | Path) -> None:
 
     It has 10 s for that, and 0.2 s more for each MB.
 
-    Raises
-    ------
-    InputError
-        If the file is damaged, or reading it does not end.
+    Raises InputError if the file is damaged, or reading it does not end.
     """
     place = Path(path)
     try:

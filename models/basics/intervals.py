@@ -144,10 +144,7 @@ def fall_time(times: npt.ArrayLike, fell: npt.ArrayLike, *, confidence: float = 
     2 r degrees of freedom at the low end and 2 r + 2 at the high one; without any fall the high
     end alone says something (three falls in the exposure, roughly).
 
-    Raises
-    ------
-    InputError
-        If there is no run, or a time is negative.
+    Raises InputError if there is no run, or a time is negative.
 
     Examples
     --------

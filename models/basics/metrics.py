@@ -101,10 +101,7 @@ def peak_factor(t_z: float, duration: float = THREE_HOURS) -> float:
     Mean zero-crossing period T_z and exposure time T are above zero [s]; the period is infinite for
     a signal at rest.
 
-    Raises
-    ------
-    InputError
-        If a period or a duration is not above zero.
+    Raises InputError if a period or a duration is not above zero.
 
     Examples
     --------

@@ -86,10 +86,7 @@ class Quadrature(ReadOnlyArrays):
     def integrate(self, values: npt.ArrayLike, axis: int = -1) -> FloatArray:
         """Integrate real values that were sampled at the nodes, which `axis` runs over, along it.
 
-        Raises
-        ------
-        InputError
-            If the samples are complex: take the modulus or the parts first.
+        Raises InputError if the samples are complex: take the modulus or the parts first.
         """
         array = np.moveaxis(_real(values), axis, -1)
         result: FloatArray = array @ self.weights

@@ -48,10 +48,7 @@ def solve_riccati(
     The weights of x'Qx + 2 x'Su + u'Ru are (n, n), (n, m), (m, m), R positive definite; A and B are
     (n, n), (n, m).
 
-    Raises
-    ------
-    SolverError
-        If R is not positive definite or no stabilising solution is found.
+    Raises SolverError if R is not positive definite or no stabilising solution is found.
     """
     try:
         root = scipy.linalg.cholesky(R, lower=True)
@@ -102,10 +99,8 @@ def solve_discrete_riccati(A: FloatArray, C: FloatArray, Q: FloatArray) -> Float
     Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Int. J. Control 77 (2004), 767-788).  The regulator's
     equation is the filter's, transposed.  A, C and Q are (n, n), (m, n), (n, n).
 
-    Raises
-    ------
-    SolverError
-        If it does not converge: something grows that is not seen, or does not settle.
+    Raises SolverError if it does not converge: something grows that is not seen, or does not
+    settle.
     """
     eye = np.eye(len(A))
     F, S, P = A.T, C.T @ C, Q

@@ -38,10 +38,7 @@ class White:
 def pick(owner: str, kind: str, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
     """Return the positions of the `wanted` names.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown; those that exist are listed.
+    Raises InputError if a name is unknown; those that exist are listed.
     """
     known = list(names)
     for name in wanted:
@@ -57,10 +54,7 @@ def signal_names(
 ) -> tuple[str, ...]:
     """Return `count` names: those given, or letter1, letter2... if none are.
 
-    Raises
-    ------
-    InputError
-        If their number is another one, or a name comes twice.
+    Raises InputError if their number is another one, or a name comes twice.
     """
     if isinstance(names, str):
         names = (names,)
@@ -79,10 +73,7 @@ def signal_delays(
 ) -> tuple[float, ...]:
     """Return one delay for each measurement [s] from numbers in order or by name.
 
-    Raises
-    ------
-    InputError
-        If their number or a name is wrong, or a delay is negative.
+    Raises InputError if their number or a name is wrong, or a delay is negative.
     """
     if isinstance(delays, Mapping):
         pick(owner, "measurement (in delays)", measurements, list(delays))
@@ -104,10 +95,7 @@ def signal_rates(
 ) -> Mapping[str, str]:
     """Return the checked mapping of rates to the disturbances they are the derivative of.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown, or a rate is that of another rate.
+    Raises InputError if a name is unknown, or a rate is that of another rate.
     """
     pick(owner, "disturbance (in rates)", disturbances, [*rates, *rates.values()])
     for rate, base in rates.items():

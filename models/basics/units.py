@@ -156,10 +156,8 @@ def units_of(kind: str) -> tuple[str, ...]:
 def parse_quantity(value: object, kind: str) -> float:
     """Read a number (SI already) or a text such as `44 mm` as a quantity of a kind of `KINDS`.
 
-    Raises
-    ------
-    InputError
-        If it is no finite number, has no unit or an unknown one, or is of another kind.
+    Raises InputError if it is no finite number, has no unit or an unknown one, or is of another
+    kind.
 
     Examples
     --------

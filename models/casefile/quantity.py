@@ -61,10 +61,7 @@ class Quantity:
     def read(self, value: object) -> float | int | str:
         """Return the value in SI, or the word.
 
-        Raises
-        ------
-        InputError
-            If it is of another kind, or out of range.
+        Raises InputError if it is of another kind, or out of range.
         """
         if self.word and value == self.word:
             return self.word

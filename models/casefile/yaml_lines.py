@@ -31,10 +31,7 @@ def read_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
 
     Messages call the text by its source.
 
-    Raises
-    ------
-    InputError
-        If the text is not YAML, holds several documents or repeats keys.
+    Raises InputError if the text is not YAML, holds several documents or repeats keys.
     """
     parser = YAML(typ="safe", pure=True)
     try:

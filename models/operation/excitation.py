@@ -134,10 +134,7 @@ class MotionSource(Protocol):
     def motion(self, duration: float, step: float, seed: int) -> Motion:
         """Return the motion over a duration [s] at a time step [s].
 
-        Raises
-        ------
-        InputError
-            If it does not last that long, or cannot be that fine.
+        Raises InputError if it does not last that long, or cannot be that fine.
         """
         ...
 
@@ -171,10 +168,7 @@ class Motion:
     def block(self, start: int, count: int) -> MotionBlock:
         """Return so many rows (count,) [SI] from one on, the same whatever was read before.
 
-        Raises
-        ------
-        InputError
-            If the motion does not have these rows.
+        Raises InputError if the motion does not have these rows.
         """
         if start < 0 or count < 0 or start + count > self.rows:
             raise InputError(

@@ -85,10 +85,7 @@ _PERIODS = {
 def fault_of(path: str) -> FaultField:
     """Return the fault that a path such as ``fault.delay_step`` means.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name.
+    Raises InputError if there is none of that name.
     """
     name = path.removeprefix(PREFIX)
     if not path.startswith(PREFIX) or name not in FAULTS:

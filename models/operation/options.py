@@ -46,10 +46,7 @@ class Option:
     def value(self, given: object, case: Case) -> float:
         """Return the value in SI: a number, a text with a unit, or None for the default.
 
-        Raises
-        ------
-        InputError
-            If it is of another kind, or out of range.
+        Raises InputError if it is of another kind, or out of range.
         """
         if given is None:
             return self.default(case) if callable(self.default) else self.default
@@ -77,10 +74,7 @@ class WordOption:
     def value(self, given: object, case: Case) -> object:
         """Return the word, the default if None is given, or the source of motion.
 
-        Raises
-        ------
-        InputError
-            If it is neither.
+        Raises InputError if it is neither.
         """
         del case
         if given is None:

@@ -226,10 +226,7 @@ class RecordMotion:
 def even_step(owner: str, time: FloatArray) -> float:
     """Return the time step of a record [s], of times (n,) [s]; rounded ones, as in files, will do.
 
-    Raises
-    ------
-    InputError
-        If they are fewer than 8, not ascending or not evenly spaced.
+    Raises InputError if they are fewer than 8, not ascending or not evenly spaced.
     """
     if time.size < _FEWEST:
         raise InputError(f"{owner}: time must have at least {_FEWEST} samples, got {time.size}")

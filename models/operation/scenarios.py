@@ -180,10 +180,7 @@ def scenario_names() -> dict[str, str]:
 def scenario_options(name: str) -> Mapping[str, Option | WordOption]:
     """Return the options of a scenario by name.
 
-    Raises
-    ------
-    InputError
-        If there is no such scenario.
+    Raises InputError if there is no such scenario.
     """
     return _recipe(name).all_options
 

@@ -188,20 +188,15 @@ class LinearPlant(ReadOnlyArrays):
     def response(self, omega: npt.ArrayLike) -> PlantResponse:
         """Return the frequency response at `omega` [rad/s], (k,), delays exact.
 
-        Raises
-        ------
-        InputError
-            If a frequency is not finite or is that of an undamped pole (0 of an integrator).
+        Raises InputError if a frequency is not finite or is that of an undamped pole (0 of an
+        integrator).
         """
         return self.response_at(1j * check_finite(_OWNER, "omega", omega).reshape(-1))
 
     def response_at(self, s: npt.ArrayLike) -> PlantResponse:
         """Return the response at points `s` of the complex plane [1/s], (k,).
 
-        Raises
-        ------
-        InputError
-            If a point is not finite or is a pole of the plant.
+        Raises InputError if a point is not finite or is a pole of the plant.
         """
         points = np.array(s, dtype=np.complex128).reshape(-1)
         check_finite(_OWNER, "s", points.view(np.float64))
@@ -283,10 +278,7 @@ class LinearPlant(ReadOnlyArrays):
 
         Linear drag is such an element: a force of -C times the payload's velocity.
 
-        Raises
-        ------
-        InputError
-            If a name is unknown, or the output has a direct term.
+        Raises InputError if a name is unknown, or the output has a direct term.
         """
         v = pick(_OWNER, "output", self.outputs, [output])[0]
         f = pick(_OWNER, "disturbance", self.disturbances, [disturbance])[0]
@@ -304,10 +296,8 @@ class LinearPlant(ReadOnlyArrays):
     ) -> LinearPlant:
         """Return the plant with one more disturbance: what it makes of states' rates and outputs.
 
-        Raises
-        ------
-        InputError
-            If a signal is unknown, or the name is one of an input or of a disturbance.
+        Raises InputError if a signal is unknown, or the name is one of an input or of a
+        disturbance.
         """
         if name in (*self.inputs, *self.disturbances):
             raise InputError(f"{_OWNER}: the name of a disturbance must be new, got {name!r}")
@@ -327,10 +317,7 @@ class LinearPlant(ReadOnlyArrays):
         What acts from the one to the other, such as drag, is then a loop around it like any other.
         Its measurement and its input bear their names with a question mark.
 
-        Raises
-        ------
-        InputError
-            If a name is unknown.
+        Raises InputError if a name is unknown.
         """
         v = pick(_OWNER, "output", self.outputs, [output])
         f = pick(_OWNER, "disturbance", self.disturbances, [disturbance])
@@ -353,10 +340,7 @@ class LinearPlant(ReadOnlyArrays):
 
         Its inputs are the v that are added to the controller's commands, under their names.
 
-        Raises
-        ------
-        InputError
-            If a measurement is late: `without_delays` first.
+        Raises InputError if a measurement is late: `without_delays` first.
         """
         if any(self.delays):
             raise InputError(
@@ -388,10 +372,7 @@ class LinearPlant(ReadOnlyArrays):
     ) -> LinearPlant:
         """Return the plant with some outputs and measurements only, in the order given.
 
-        Raises
-        ------
-        InputError
-            If a name is unknown.
+        Raises InputError if a name is unknown.
         """
         outputs = self.outputs if outputs is None else tuple(outputs)
         measurements = self.measurements if measurements is None else tuple(measurements)
@@ -497,10 +478,7 @@ class LinearPlant(ReadOnlyArrays):
     def discretise(self, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return A, B and E of the plant sampled every `dt` [s], inputs and disturbances held.
 
-        Raises
-        ------
-        InputError
-            If `dt` is not above zero.
+        Raises InputError if `dt` is not above zero.
         """
         check_range(_OWNER, "dt", dt, low=0.0, unit="s", open_low=True)
         Ad, BEd = zero_order_hold(self.A, np.hstack([self.B, self.E]), dt)

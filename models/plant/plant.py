@@ -112,10 +112,7 @@ class Plant(Equations):
     def parameter_vector(self, changes: Mapping[str, float] | None = None) -> FloatArray:
         """Return p, some of its entries replaced by name.
 
-        Raises
-        ------
-        InputError
-            If a name is unknown or a value is not finite.
+        Raises InputError if a name is unknown or a value is not finite.
         """
         changes = changes or {}
         pick("plant", "parameter", tuple(self.parameters), tuple(changes))
@@ -130,10 +127,7 @@ class Plant(Equations):
         motor holds the load as if hauling it (gear direction +1) unless `parameters` say
         otherwise: that torque is the one to set against a rating.
 
-        Raises
-        ------
-        SolverError
-            If the solve leaves a residual.
+        Raises SolverError if the solve leaves a residual.
         """
         p = self.parameter_vector({"winch.gear_direction": 1.0, **(parameters or {})})
         values = dict(zip(self.parameters, p, strict=True))
@@ -196,12 +190,8 @@ class Plant(Equations):
         the motor hauling and there is no ``loss``.  The payload's equivalent linear drag
         coefficient is C [N s/m]; `parameters` changes others by name.
 
-        Raises
-        ------
-        InputError
-            If `drag` is negative or a parameter is unknown.
-        SolverError
-            If there is no static operating point.
+        Raises InputError if `drag` is negative or a parameter is unknown; SolverError if there is
+        no static operating point.
         """
         check_range("plant", "drag", drag, low=0.0, unit="N s/m")
         changes = {**(parameters or {}), "payload.linear_drag": drag}

@@ -366,10 +366,7 @@ class PlantData:
     def from_case(cls, case: Case) -> PlantData:
         """Return the numbers of a case: radius of the layer in use, virtual mass, drag.
 
-        Raises
-        ------
-        InputError
-            If the drum does not hold the rope that is paid out.
+        Raises InputError if the drum does not hold the rope that is paid out.
         """
         rope, payload, winch, sensors = case.rope, case.payload, case.winch, case.sensors
         motor = winch.motor
@@ -434,10 +431,7 @@ def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
     has no second mode even to miss; a ``thesis`` lumping with its number of masses given is
     left as it is.
 
-    Raises
-    ------
-    InputError
-        If more than 40 masses would be needed.
+    Raises InputError if more than 40 masses would be needed.
     """
     if data.lumping == "thesis" and data.masses is not None:
         return data.masses

@@ -54,10 +54,7 @@ class PlantResponse:
     def column(self, output: str, disturbance: str) -> ComplexArray:
         """Return the open-loop response of `output` to `disturbance`, (k,).
 
-        Raises
-        ------
-        InputError
-            If a name is unknown.
+        Raises InputError if a name is unknown.
         """
         row = pick("plant response", "output", self.outputs, [output])[0]
         column = pick("plant response", "disturbance", self.disturbances, [disturbance])[0]
@@ -72,10 +69,7 @@ class PlantResponse:
     ) -> PlantResponse:
         """Return the response of some signals only, in the order given.
 
-        Raises
-        ------
-        InputError
-            If a name is unknown.
+        Raises InputError if a name is unknown.
         """
         if outputs is not None:
             z = pick("plant response", "output", self.outputs, outputs)

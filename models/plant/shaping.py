@@ -155,10 +155,7 @@ def sampled_density(
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return nodes of a band evenly in the logarithm, their widths, the density, its variance.
 
-    Raises
-    ------
-    InputError
-        If the band holds no variance.
+    Raises InputError if the band holds no variance.
     """
     edges = np.geomspace(*band, nodes + 1)
     omega, width = np.sqrt(edges[1:] * edges[:-1]), np.diff(edges)

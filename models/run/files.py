@@ -79,10 +79,7 @@ def to_xarray(run: Run) -> xarray.Dataset:
 def write_netcdf(run: Run, path: str | Path) -> Path:
     """Write the signals of a run as NetCDF.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written; what stood there before stays.
+    Raises InputError if the file cannot be written; what stood there before stays.
     """
     data = to_xarray(run)
     # The format has no integers beyond 32 bits; a long seed goes as text.
@@ -100,10 +97,7 @@ def write_csv(run: Run, path: str | Path) -> Path:
 
     Numbers are the shortest texts that read back as the same number.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written; what stood there before stays.
+    Raises InputError if the file cannot be written; what stood there before stays.
     """
 
     def write(place: Path) -> None:
@@ -119,10 +113,7 @@ def write_parquet(run: Run, path: str | Path) -> Path:
     Units are metadata of the columns (key `units`), the attributes metadata of the file (key
     `stillhook`, JSON).
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written; what stood there before stays.
+    Raises InputError if the file cannot be written; what stood there before stays.
     """
     import pyarrow as pa
     from pyarrow import parquet

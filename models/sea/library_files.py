@@ -70,10 +70,7 @@ _MOST_VALUES = 3e8  # densities of one file: 2.4 GB
 def read_with_library(path: str, name: str) -> RawRecords:
     """Read a file of one format of :data:`FORMATS`, or `netcdf` to find out which one it is.
 
-    Raises
-    ------
-    InputError
-        If `stillhook[waves]` is not installed, or the file cannot be read.
+    Raises InputError if `stillhook[waves]` is not installed, or the file cannot be read.
     """
     try:
         importlib.import_module("wavespectra")

@@ -44,10 +44,8 @@ def is_ndbc(head: str) -> bool:
 def read_ndbc(path: str | Path) -> RawRecords:
     """Read a file of spectral densities.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, has no such header, or holds something else than densities.
+    Raises InputError if it cannot be read, has no such header, or holds something else than
+    densities.
     """
     lines = [
         (number, line.replace(",", " "))

@@ -126,10 +126,7 @@ class SeaRecords:
     def from_raw(cls, raw: RawRecords, source: str) -> SeaRecords:
         """Return what is left of a reader's records after quality control.
 
-        Raises
-        ------
-        InputError
-            If the frequencies are no table, or no record is left.
+        Raises InputError if the frequencies are no table, or no record is left.
         """
         frequency, density, notes = _without_empty_columns(raw)
         _check_frequencies(frequency, density, source)
@@ -189,10 +186,7 @@ class SeaRecords:
 
         Above the last frequency it may `decay`, falling as omega^-5, or be `zero`.
 
-        Raises
-        ------
-        InputError
-            If there is no such record.
+        Raises InputError if there is no such record.
         """
         last = len(self) - 1
         if not 0 <= record <= last:
@@ -212,10 +206,7 @@ class SeaRecords:
         vessel's bow is given, clockwise from north [rad], each state has the direction that its
         waves travel towards, counter-clockwise from the bow.
 
-        Raises
-        ------
-        InputError
-            If a vessel's heading is given and the file has no directions.
+        Raises InputError if a vessel's heading is given and the file has no directions.
         """
         heading = None
         if vessel_heading is not None:
@@ -269,10 +260,7 @@ def _guess_format(path: str) -> str:
     It is told by what is in the file; its name and extension only count for the few formats without
     a mark of their own.  NetCDF files are all `netcdf`: what they are shows when they are opened.
 
-    Raises
-    ------
-    InputError
-        If it is none that is known.
+    Raises InputError if it is none that is known.
     """
     raw = read_bytes(path)
     if not raw.strip():

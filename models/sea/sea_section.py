@@ -169,10 +169,7 @@ class SeaSection(Section):
 
         The height stays, also where it came from the wind.
 
-        Raises
-        ------
-        InputError
-            If the spectrum has no period of its own.
+        Raises InputError if the spectrum has no period of its own.
         """
         if not self.period_field:
             raise InputError(
@@ -199,10 +196,8 @@ class SeaSection(Section):
     def to_spectrum(self) -> SeaSpectrum:
         """Return the spectrum.
 
-        Raises
-        ------
-        InputError
-            If the form is not defined for these values, or a file of spectra cannot be read.
+        Raises InputError if the form is not defined for these values, or a file of spectra cannot
+        be read.
         """
         return _spectrum(self, tuple(file_stamp(file) for file in self._files()))
 

@@ -170,10 +170,7 @@ def fully_arisen(wind_speed: float) -> tuple[float, float]:
     Neumann and James 1955) is sqrt(2) times as long, and this is what the thesis takes as T_S:
     8.1 s at 20 knots, where the table has 5.7 s.
 
-    Raises
-    ------
-    InputError
-        If the wind is outside the table.
+    Raises InputError if the wind is outside the table.
 
     Examples
     --------

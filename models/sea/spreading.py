@@ -44,10 +44,7 @@ class Spreading:
 
     Wind seas have s about 5 to 15 (n 2 to 6), swell s of 30 and more.
 
-    Raises
-    ------
-    InputError
-        If the kind is unknown or the exponent out of range.
+    Raises InputError if the kind is unknown or the exponent out of range.
 
     Examples
     --------
@@ -89,10 +86,7 @@ class Spreading:
         counter-clockwise from the bow [rad]; ``weights @ f(headings)`` is the mean of f.  By
         default they are 65 for `cos-2s` and 33 for `cos-n`; odd numbers include the mean heading.
 
-        Raises
-        ------
-        InputError
-            If the heading is not finite or the count below one.
+        Raises InputError if the heading is not finite or the count below one.
         """
         from scipy.special import roots_gegenbauer
 

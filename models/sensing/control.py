@@ -66,10 +66,7 @@ class Measurement:
     def __getitem__(self, name: str) -> float:
         """Return one value by name.
 
-        Raises
-        ------
-        InputError
-            If there is no such measurement.
+        Raises InputError if there is no such measurement.
         """
         at = _AT.get(name)
         if at is None:
@@ -80,10 +77,7 @@ class Measurement:
     def of(cls, named: Mapping[str, float]) -> Measurement:
         """Return the measurement with these values, zero where none is given.
 
-        Raises
-        ------
-        InputError
-            If a name is unknown.
+        Raises InputError if a name is unknown.
         """
         values = np.zeros(len(HEARD))
         values[pick("measurement", "signal", HEARD, tuple(named))] = list(named.values())
@@ -124,10 +118,7 @@ class Recursion:
     The state xc is (nxc, 1) and may be empty; the measurements m are (16, 1), in the order of
     `HEARD`.
 
-    Raises
-    ------
-    InputError
-        If the function's shapes are others, or the initial state is not finite.
+    Raises InputError if the function's shapes are others, or the initial state is not finite.
     """
 
     function: ca.Function

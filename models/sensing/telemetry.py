@@ -234,11 +234,8 @@ def check_intervals(
 
     The start is included, the end is not.  Intervals that have to be `apart` come in order of time.
 
-    Raises
-    ------
-    InputError
-        If one is no such row, does not start before its end, which may be infinite, or has a size
-        out of its range; if two overlap that have to be apart.
+    Raises InputError if one is no such row, does not start before its end, which may be infinite,
+    or has a size out of its range; if two overlap that have to be apart.
     """
     checked = []
     for interval in intervals:

@@ -85,10 +85,8 @@ def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:
 
     Symbols to be found must be exported, the rest stays hidden.
 
-    Raises
-    ------
-    SolverError
-        If the compiler fails or its library cannot be loaded; its first words are quoted.
+    Raises SolverError if the compiler fails or its library cannot be loaded; its first words are
+    quoted.
     """
     flags = FLAGS if len(source) < LONG_SOURCE else ("-O1", *FLAGS[1:])
     machine = f"{platform.system()} {platform.machine()}"  # homes are shared between machines

@@ -331,10 +331,7 @@ def _rest(case: Case, masses: int | None, surroundings: Surroundings | None) -> 
 
     A payload that stands on a deck, or hangs in air, has another weight than in the water.
 
-    Raises
-    ------
-    InputError
-        If the drive cannot hold the load.
+    Raises InputError if the drive cannot hold the load.
     """
     lifted = 0.0 if surroundings is None else surroundings.rest_force
     weight = {"payload.submerged_weight": case.payload.submerged_weight - lifted}

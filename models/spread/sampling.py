@@ -27,10 +27,7 @@ _MOST_CORNERS = 1 << 20
 def counted(method: str, samples: int, columns: int) -> int:
     """Return how many rows a design really has: a grid and the corners have their own number.
 
-    Raises
-    ------
-    InputError
-        If the method is unknown or there are too many corners.
+    Raises InputError if the method is unknown or there are too many corners.
     """
     check_choice("spread", "method", method, METHODS)
     check_range("spread", "samples", samples, low=1)

@@ -28,10 +28,7 @@ _SAME_VALUE = 1e-3  # of the largest, for a heading that is there twice, as 0 an
 def text_of(owner: str, data: bytes) -> str:
     """Return bytes as text: UTF-8, with or without a byte order mark, or else Latin-1.
 
-    Raises
-    ------
-    InputError
-        If they are no text.
+    Raises InputError if they are no text.
     """
     if b"\x00" in data:
         raise InputError(f"{owner}: this is a binary file, not the text that was expected")
@@ -49,10 +46,7 @@ def decoded(value: object) -> str:
 def numbers(owner: str, line: int, words: Sequence[str]) -> list[float]:
     """Return words as finite numbers; Fortran's 1.0D+00 is one too.
 
-    Raises
-    ------
-    InputError
-        If a word is no finite number; the line is told.
+    Raises InputError if a word is no finite number; the line is told.
     """
     found = []
     for word in words:
@@ -73,11 +67,8 @@ def grid(
 
     A row (n,) has a frequency [rad/s], a direction in [0, 2 pi) [rad] and six operators.
 
-    Raises
-    ------
-    InputError
-        If a frequency lacks a heading that others have, or a row is there twice with other
-        numbers.
+    Raises InputError if a frequency lacks a heading that others have, or a row is there twice with
+    other numbers.
     """
     w = np.asarray(omega, dtype=np.float64)
     b = np.asarray(heading, dtype=np.float64)

@@ -175,10 +175,7 @@ class Convention:
 def one_of(owner: str, name: str, value: object, choices: Sequence[str]) -> str:
     """Return a text that must be one of a few, whatever its capitals.
 
-    Raises
-    ------
-    InputError
-        If it is none of them; the owner, the name and the choices are told.
+    Raises InputError if it is none of them; the owner, the name and the choices are told.
     """
     text = " ".join(str(value).split()).lower()
     for choice in choices:

@@ -33,10 +33,8 @@ _HEADING_ERROR = 0.01
 def vessel_raos(vessel: Vessel, owner: str = "case") -> VesselRaos:
     """Return the six motions that a vessel names, at its own speed where the file has it.
 
-    Raises
-    ------
-    InputError
-        If the vessel has no `raos`, or the file is not what it should be; the field is named.
+    Raises InputError if the vessel has no `raos`, or the file is not what it should be; the field
+    is named.
     """
     name = vessel.raos
     if name is None:
@@ -154,10 +152,7 @@ def hook_operators(
 
     Frequencies (k,) [rad/s], operators (k, n) [m/m], headings (n,) [rad], weights (n,).
 
-    Raises
-    ------
-    InputError
-        If the file is wrong, or the vessel has not been computed in these headings.
+    Raises InputError if the file is wrong, or the vessel has not been computed in these headings.
     """
     raos = vessel_raos(vessel, owner)
     point, heading = vessel.hook_point, vessel.heading

@@ -442,10 +442,7 @@ def _spline_weights(heading: FloatArray, wanted: FloatArray) -> FloatArray:
 def _linear_weights(owner: str, heading: FloatArray, wanted: FloatArray) -> FloatArray:
     """Return the weights (u, h) of the two headings beside each, round the circle.
 
-    Raises
-    ------
-    InputError
-        If a heading lies in a gap wider than :data:`WIDEST_GAP`.
+    Raises InputError if a heading lies in a gap wider than :data:`WIDEST_GAP`.
     """
     turn = 2.0 * math.pi
     left = np.searchsorted(heading, wanted, side="right") - 1  # -1: between the last and the first

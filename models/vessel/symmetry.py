@@ -31,10 +31,7 @@ def completed(raos: VesselRaos, symmetry: str) -> VesselRaos:
 
     Its origin is on the plane, or the axis, of symmetry.
 
-    Raises
-    ------
-    InputError
-        If the symmetry is unknown, or circular with more than one heading given.
+    Raises InputError if the symmetry is unknown, or circular with more than one heading given.
     """
     if symmetry == "none":
         return raos

@@ -251,10 +251,7 @@ def fingerprint(options: Mapping[str, Any], *arrays: FloatArray) -> str:
 def store_solution(folder: str | Path, key: str, solution: RecordSolution, drag: float) -> Path:
     """Write an entry, whole or not at all.
 
-    Raises
-    ------
-    InputError
-        If the folder cannot be made or written to.
+    Raises InputError if the folder cannot be made or written to.
     """
     path = _path(folder, key)
     try:

@@ -48,10 +48,7 @@ _FINE = (1e-6, 1e4)  # below this mean square [m2] once more with this factor
 def solve_record(problem: RecordProblem, *, block: int | None = None) -> RecordSolution:
     """Solve the programme, in blocks of 1 to 16 samples; by default what suits the states.
 
-    Raises
-    ------
-    SolverError
-        If the solver finds no solution.
+    Raises SolverError if the solver finds no solution.
     """
     n = len(problem.plant.states)
     size = block or (2 if n <= 6 else min(_LONGEST_BLOCK, max(4, n // 2)))

@@ -29,10 +29,7 @@ class PerfectPreview:
     rows it is the cubic that has their displacements and velocities (exact at the rows); before
     its first and beyond its last row it is held, with velocity zero.
 
-    Raises
-    ------
-    InputError
-        If a number is out of its range.
+    Raises InputError if a number is out of its range.
     """
 
     def __init__(self, *, sample_time: float, horizon: float) -> None:
@@ -68,10 +65,8 @@ class PerfectPreview:
     def forecast(self) -> Forecast:
         """Return the record at now + leads.
 
-        Raises
-        ------
-        InputError
-            If there is no record, or no sample has come, or the time is no sample of the grid.
+        Raises InputError if there is no record, or no sample has come, or the time is no sample of
+        the grid.
         """
         record, n = self._record, self.leads.size
         if record is None:

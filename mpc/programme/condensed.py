@@ -255,10 +255,8 @@ def default_blocking(owner: str, horizon: float, sample_time: float) -> tuple[in
 
     What is far ahead is known less well and is planned again many times before it comes.
 
-    Raises
-    ------
-    InputError
-        If the horizon is shorter than four samples or longer than 2000; `owner` begins the message.
+    Raises InputError if the horizon is shorter than four samples or longer than 2000; `owner`
+    begins the message.
     """
     check_range(owner, "horizon", horizon, low=4 * sample_time, high=2000 * sample_time, unit="s")
     left = round(horizon / sample_time)

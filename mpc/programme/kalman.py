@@ -22,10 +22,7 @@ def prediction_covariance(
     Its process has noise G n, n white and of variance one; R are the variances of the errors of its
     outputs.  For the numerics `scale` is the size of each state, (n,).
 
-    Raises
-    ------
-    SolverError
-        If there is none.
+    Raises SolverError if there is none.
     """
     # Each state in its own size, each measurement in units of its own error.
     P = solve_discrete_riccati(

@@ -176,10 +176,7 @@ class WinchEstimator:
 def kalman_covariance(model: PredictionModel) -> FloatArray:
     """Return the covariance of the steady one-step prediction, (n, n).
 
-    Raises
-    ------
-    SolverError
-        If there is none.
+    Raises SolverError if there is none.
     """
     P = prediction_covariance(model.A, model.C, model.G, model.R, model.scale)
     # Some states are known to a fiftieth of their size and less: in units of what they are known

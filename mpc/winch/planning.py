@@ -25,10 +25,7 @@ from .prediction import PredictionModel, prediction_model
 def plan_model(model: PredictionModel, stiffness: float) -> PredictionModel:
     """Return the estimator's model on a rope of another axial stiffness, over the case's own.
 
-    Raises
-    ------
-    InputError
-        If the stiffness is not above zero.
+    Raises InputError if the stiffness is not above zero.
     """
     if stiffness == 1.0:
         return model

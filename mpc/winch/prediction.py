@@ -185,10 +185,7 @@ class PredictionModel(ReadOnlyArrays):
 def prediction_model(winch: SampledWinch) -> PredictionModel:
     """Return the prediction model of a winch, next to certain of the world: see `with_noise`.
 
-    Raises
-    ------
-    SolverError
-        If the hook's spectrum cannot be fitted.
+    Raises SolverError if the hook's spectrum cannot be fitted.
     """
     case = winch.case
     hook, T, n = HookMotion.from_case(case), winch.sample_time, winch.size
@@ -337,10 +334,7 @@ def _variances(model: PredictionModel, share: float) -> FloatArray:
 def sea_filter(hook: HookMotion) -> ShapingFilter:
     """Return the shaping filter that fits a hook's motion best, of order 4, 6 or 8.
 
-    Raises
-    ------
-    SolverError
-        If none fits.
+    Raises SolverError if none fits.
     """
     fits = []
     for order in (4, 6, 8):

@@ -21,10 +21,7 @@ def regulator(model: PredictionModel, weight: float) -> LQRegulator:
 
     That is what the drive's peak torque costs, over a displacement of the hook's rms.
 
-    Raises
-    ------
-    SolverError
-        If the Riccati equation has no solution.
+    Raises SolverError if the Riccati equation has no solution.
     """
     winch, nh = model.winch, model.sea.order
     heave = float(np.sqrt(_stationary(model)[0, 0]))

@@ -24,10 +24,7 @@ def given_case(arguments: argparse.Namespace) -> Case:
     Everything about the case that there is to warn of is told here, each thing once, and then
     no more: a search looks at seas and drives that nobody has asked for.
 
-    Raises
-    ------
-    InputError
-        If the case is wrong, or a change is.
+    Raises InputError if the case is wrong, or a change is.
     """
     from models import load_case
     from models.hook import HookMotion
@@ -45,10 +42,7 @@ def given_case(arguments: argparse.Namespace) -> Case:
 def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
     """Return changes by dotted path from texts PATH=VALUE, VALUE as in a case file.
 
-    Raises
-    ------
-    InputError
-        If a text is not of that form, or a path comes twice.
+    Raises InputError if a text is not of that form, or a path comes twice.
 
     Examples
     --------
@@ -61,10 +55,7 @@ def parse_changes(texts: Sequence[str]) -> dict[str, Any]:
 def parse_members(texts: Sequence[str]) -> list[dict[str, Any]]:
     """Return changes by dotted path from texts PATH=VALUE[;PATH=VALUE..], one for each member.
 
-    Raises
-    ------
-    InputError
-        If a text is not of that form, or a path comes twice in one.
+    Raises InputError if a text is not of that form, or a path comes twice in one.
 
     Examples
     --------
@@ -78,10 +69,7 @@ def parse_members(texts: Sequence[str]) -> list[dict[str, Any]]:
 def parse_fixed(texts: Sequence[str]) -> dict[str, float]:
     """Return parameters by name from texts NAME=NUMBER.
 
-    Raises
-    ------
-    InputError
-        If a text is not of that form, a value is no number, or a name comes twice.
+    Raises InputError if a text is not of that form, a value is no number, or a name comes twice.
     """
     pairs = read_pairs("--fix", "NAME=NUMBER, as in a=0", texts)
     return {name: check_range("--fix", name, value) for name, value in pairs.items()}
@@ -128,11 +116,8 @@ def read_pairs(option: str, form: str, texts: Sequence[str]) -> dict[str, Any]:
 def parse_gains(text: str, structure: str = "payload-feedback") -> dict[str, float]:
     """Return gains, or the parameters of another structure, by name from a text.
 
-    Raises
-    ------
-    InputError
-        If one is not a finite number or given twice; if it is unknown or missing among the
-        gains of payload feedback, of which `A` may be missing.
+    Raises InputError if one is not a finite number or given twice; if it is unknown or missing
+    among the gains of payload feedback, of which `A` may be missing.
 
     Examples
     --------
@@ -155,10 +140,7 @@ def parse_gains(text: str, structure: str = "payload-feedback") -> dict[str, flo
 def parse_options(texts: Sequence[str]) -> dict[str, Any]:
     """Return options of a scenario from texts KEY=VALUE.
 
-    Raises
-    ------
-    InputError
-        If a text is not of that form, or a key comes twice.
+    Raises InputError if a text is not of that form, or a key comes twice.
 
     Examples
     --------

@@ -39,12 +39,8 @@ def given_design(case: Case, arguments: argparse.Namespace, *, search: bool = Tr
     The best ones, of the structure that is named if one is, are searched for where there are no
     others, if `search`.
 
-    Raises
-    ------
-    InputError
-        If a file and gains are given, the file holds no design, or there is none and no search.
-    SynthesisError
-        If no design was found.
+    Raises InputError if a file and gains are given, the file holds no design, or there is none and
+    no search; SynthesisError if no design was found.
     """
     # Here, as the parser imports this file and has to be quick.
     from synth import evaluate_gains

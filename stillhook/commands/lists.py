@@ -42,10 +42,7 @@ def names(name: str, text: str) -> tuple[str, ...]:
 def parse_range(name: str, text: str) -> tuple[float, float]:
     """Return the two ends of a text LOW..HIGH.
 
-    Raises
-    ------
-    InputError
-        If it is not of that form.
+    Raises InputError if it is not of that form.
 
     Examples
     --------

@@ -22,10 +22,7 @@ from .given import split_pairs
 def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | DiscreteValues]:
     """Return values by path from texts PATH=LOW..HIGH, PATH=A,B,.. or PATH=A|B|..
 
-    Raises
-    ------
-    InputError
-        If a text has none of these forms, or a path comes twice.
+    Raises InputError if a text has none of these forms, or a path comes twice.
 
     Examples
     --------
@@ -49,10 +46,7 @@ def parse_vary(texts: Sequence[str]) -> dict[str, list[Any] | DiscreteValues]:
 def parse_seas(text: str | None, scatter: str | None) -> list[SeaState] | None:
     """Return sea states from a text or a scatter table; None for the case's own sea.
 
-    Raises
-    ------
-    InputError
-        If both are given, or one of them cannot be read.
+    Raises InputError if both are given, or one of them cannot be read.
 
     Examples
     --------

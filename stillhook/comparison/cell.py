@@ -183,10 +183,7 @@ class CommonSea(SpectrumMotion):
 class Prepared:
     """A contender in one sea, ready to run.
 
-    Raises
-    ------
-    InputError, SynthesisError, SolverError
-        If there is no such controller for the case.
+    Raises InputError, SynthesisError, SolverError if there is no such controller for the case.
     """
 
     def __init__(
@@ -219,10 +216,7 @@ class Prepared:
     def run(self, seed: int, progress: Progress | None = None) -> Cell:
         """Run with one seed.
 
-        Raises
-        ------
-        KeyboardInterrupt
-            If the run was interrupted: half a run is worth nothing.
+        Raises KeyboardInterrupt if the run was interrupted: half a run is worth nothing.
         """
         return self._cell(self._run(seed, progress), seed)
 

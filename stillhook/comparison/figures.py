@@ -73,10 +73,7 @@ def heights(found: Comparison) -> Figure:
     the load in any run.  With a single height the contenders stand below each other, each with a
     dot for every seed.
 
-    Raises
-    ------
-    InputError
-        If there are no runs.
+    Raises InputError if there are no runs.
     """
     values = [found.pooled(c.name, h) for c in found.contenders for h in found.heights]
     known = [value for value in values if math.isfinite(value) and value > 0.0]
@@ -94,10 +91,7 @@ def heights(found: Comparison) -> Figure:
 def worst_moment(found: Comparison) -> Figure:
     """Return time traces around the worst moment of the best linear law, for the same seed.
 
-    Raises
-    ------
-    InputError
-        If there are no traces.
+    Raises InputError if there are no traces.
     """
     if found.worst_moment is None or not found.traces:
         raise InputError("comparison: there are no traces to draw")

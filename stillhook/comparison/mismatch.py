@@ -57,10 +57,7 @@ class Mismatch:
     def read(cls, given: str | Mapping[str, object] | None) -> Mismatch:
         """Return a mismatch from a text such as ``"payload=+30%,delay=+50 ms"`` or a mapping.
 
-        Raises
-        ------
-        InputError
-            If the text is not of that form, or a name comes twice.
+        Raises InputError if the text is not of that form, or a name comes twice.
 
         Examples
         --------
@@ -91,10 +88,8 @@ class Mismatch:
     def apply(self, case: Case) -> Case:
         """Return the case with the changes.
 
-        Raises
-        ------
-        InputError
-            If a name is unknown, a value cannot be read, or the changed case is not valid.
+        Raises InputError if a name is unknown, a value cannot be read, or the changed case is not
+        valid.
         """
         if not self.changes:
             return case

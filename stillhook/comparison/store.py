@@ -35,10 +35,7 @@ def question_of(question: ComparisonQuestion) -> dict[str, Any]:
 class Store:
     """Results on disk, in a journal; `laws` are the designs by what was needed and height [m].
 
-    Raises
-    ------
-    InputError
-        As for `Journal`.
+    Raises InputError as for `Journal`.
     """
 
     def __init__(self, path: Path, question: ComparisonQuestion) -> None:

@@ -138,10 +138,7 @@ def contenders_of(wanted: Sequence[object] | None) -> tuple[Contender, ...]:
 
     None stands for `DEFAULTS`.
 
-    Raises
-    ------
-    InputError
-        If there is none, a name is unknown or comes twice, or one is none of these.
+    Raises InputError if there is none, a name is unknown or comes twice, or one is none of these.
     """
     if wanted is not None and (isinstance(wanted, str) or not isinstance(wanted, Sequence)):
         wanted = [wanted]

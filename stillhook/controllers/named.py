@@ -110,10 +110,8 @@ def feedback_of(
 ) -> LinearFeedback:
     """Return linear feedback of gains, a controller or a design, by its name without anti-windup.
 
-    Raises
-    ------
-    InputError
-        If it is to be without, but has no states; or as `synth.controllers.LinearFeedback`.
+    Raises InputError if it is to be without, but has no states; or as
+    `synth.controllers.LinearFeedback`.
     """
     from synth.controllers import LinearFeedback
     from synth.loop import LinearController
@@ -135,10 +133,7 @@ def feedback_of(
 def gains_in_use(case: Case) -> dict[str, float]:
     """Return the gains that a case has in use, by name.
 
-    Raises
-    ------
-    InputError
-        If it has none.
+    Raises InputError if it has none.
     """
     if case.gains is None:
         raise InputError(f"the case {case.name} has no gains in use: optimise them, or give them")
@@ -155,10 +150,7 @@ def controller_of(
 ) -> Controller:
     """Return the controller that is meant: by its name, of a design, or the object itself.
 
-    Raises
-    ------
-    InputError
-        If it is none of these, or what is given with it does not belong to it.
+    Raises InputError if it is none of these, or what is given with it does not belong to it.
     """
     from synth.design import Design, Tuning
 

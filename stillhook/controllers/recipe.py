@@ -67,20 +67,14 @@ class Recipe:
     def controller(self, case: Case, design: StoredDesign | None = None) -> Controller:
         """Return the controller for a case, of its own design or of one that was found for it.
 
-        Raises
-        ------
-        InputError, SynthesisError, SolverError
-            If there is none for the case.
+        Raises InputError, SynthesisError, SolverError if there is none for the case.
         """
         return self.make(case, self.design if design is None else design)
 
     def with_gains(self, case: Case, gains: Mapping[str, float]) -> Recipe:
         """Return the recipe with some of its gains changed, for a case.
 
-        Raises
-        ------
-        InputError
-            If it has none.
+        Raises InputError if it has none.
         """
         if self.design is None or not self.gains:
             raise InputError(f"{self.name}: gains can be varied of a design of a winch")
@@ -89,10 +83,8 @@ class Recipe:
     def follow(self, case: Case, starts: int) -> Controller:
         """Return the controller made for a case; a design is designed anew.
 
-        Raises
-        ------
-        InputError, SynthesisError, SolverError
-            If there is none for the case, or it cannot follow.
+        Raises InputError, SynthesisError, SolverError if there is none for the case, or it cannot
+        follow.
         """
         if self.kind == "object":
             raise InputError(
@@ -164,10 +156,7 @@ def recipe_of(wanted: object, owner: str) -> Recipe:
 def recipe_from(about: Mapping[str, Any]) -> Recipe:
     """Return the recipe that a store tells of.
 
-    Raises
-    ------
-    InputError
-        If it was an object or a function, which no store can keep.
+    Raises InputError if it was an object or a function, which no store can keep.
     """
     if about["kind"] == "name":
         return recipe_of(str(about["name"]), "sweep")

@@ -131,10 +131,7 @@ def responses(design: Design) -> Figure:
 def limits(design: Design) -> Figure:
     """Return the use of each limit as a bar, in percent; what the case only reports is hatched.
 
-    Raises
-    ------
-    InputError
-        If the design has no limits to show (an unstable loop).
+    Raises InputError if the design has no limits to show (an unstable loop).
     """
     table = limit_table(design)
     uses: list[Bar] = [row[3] for row in table.rows]
@@ -316,10 +313,7 @@ def nyquist(design: Design) -> Figure:
     Real against imaginary part of L(i omega) near -1; the loop is broken at the command, and may be
     unstable.
 
-    Raises
-    ------
-    InputError
-        If all gains are zero: there is no loop.
+    Raises InputError if all gains are zero: there is no loop.
     """
     if not has_loop(design):
         raise InputError("nyquist: all gains are zero, so there is no loop")

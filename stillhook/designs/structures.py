@@ -57,10 +57,7 @@ def structures(designs: Sequence[Design], *, bound: bool = True) -> Figure:
     design is not ok; if `bound`, a mark at the least that any linear controller leaves with the
     same sensors.  Right: M_s.
 
-    Raises
-    ------
-    InputError
-        If there is no design, or none of them is stable.
+    Raises InputError if there is no design, or none of them is stable.
     """
     stable = [design for design in designs if math.isfinite(design.payload_rms)]
     if not stable:

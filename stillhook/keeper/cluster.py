@@ -110,12 +110,8 @@ class Cluster(Pool):
     def _answer(self, timeout: float) -> tuple[Any, Any] | None:
         """Return a task and what its future holds.
 
-        Raises
-        ------
-        InputError
-            If a worker has other code.
-        SolverError
-            If the cluster is gone, or cannot do the task at all.
+        Raises InputError if a worker has other code; SolverError if the cluster is gone, or cannot
+        do the task at all.
         """
         if clock.monotonic() - self._counted > POLL:
             self._count_threads()
@@ -200,10 +196,7 @@ def _bench(pickled: bytes) -> tuple[Bench, str, threading.Lock]:
 def _distributed() -> Any:
     """Return dask.distributed.
 
-    Raises
-    ------
-    InputError
-        If it is not installed.
+    Raises InputError if it is not installed.
     """
     try:
         import distributed

@@ -82,10 +82,7 @@ class Journal:
     def add(self, key: object, values: object) -> None:
         """Keep a result; what is not finite is written as a text, and read back as it was.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written.
+        Raises InputError if it cannot be written.
         """
         self._put({"key": key, "values": values})
 
@@ -159,10 +156,7 @@ class Journal:
 def question_in(path: Path, what: str) -> dict[str, Any]:
     """Return the question that a journal answers.
 
-    Raises
-    ------
-    InputError
-        If there is no journal, or it is none of this version's.
+    Raises InputError if there is no journal, or it is none of this version's.
     """
     try:
         with open(path, "rb") as file:

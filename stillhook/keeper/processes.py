@@ -145,10 +145,7 @@ class Processes(Pool):
     def submit(self, task: Task) -> None:
         """Give a task to an idle process, best to one that has prepared its group already.
 
-        Raises
-        ------
-        InputError
-            If the task cannot be sent to another process.
+        Raises InputError if the task cannot be sent to another process.
         """
         packed = _packed(task)
         best = next((p for p in self._idle if p.last == task.group), None)
@@ -197,10 +194,7 @@ def serve() -> None:
 def _packed(content: object) -> bytes:
     """Return what is sent to a process; here, as nobody would hear of a thread that fails.
 
-    Raises
-    ------
-    InputError
-        If it cannot be pickled: a function of a script or a notebook, an open file.
+    Raises InputError if it cannot be pickled: a function of a script or a notebook, an open file.
     """
     try:
         return pickle.dumps(content)
@@ -218,10 +212,7 @@ def _send(stream: IO[bytes], data: bytes) -> None:
 def _receive(stream: IO[bytes]) -> Any:
     """Read what was pickled and written with `_send`.
 
-    Raises
-    ------
-    EOFError
-        If the other end is gone.
+    Raises EOFError if the other end is gone.
     """
     head = stream.read(_LENGTH.size)
     if len(head) < _LENGTH.size:

@@ -46,10 +46,7 @@ def comparison(compared: Sequence[Runs]) -> Figure:
     Standard deviation of the payload's error [m or mm], logarithmic where controllers differ by
     more than a factor of ten.
 
-    Raises
-    ------
-    InputError
-        If no run has any statistics.
+    Raises InputError if no run has any statistics.
     """
     name = main_quantity(compared)
     values = [_values(runs, name) for runs in compared]
@@ -102,10 +99,7 @@ def exceedance(compared: Sequence[Runs]) -> Figure:
     or mm] over the time in which it is reached once, of runs in which the payload stays in its
     place.
 
-    Raises
-    ------
-    InputError
-        If no run has any crests.
+    Raises InputError if no run has any crests.
     """
     curves = [_crests(runs) for runs in compared]
     sizes = [float(levels.max()) for levels, _, _ in curves if levels.size]

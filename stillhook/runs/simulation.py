@@ -43,10 +43,7 @@ class Series:
     ) -> Series:
         """Prepare, the controller made for the scenario's own case (`Scenario.case_for`).
 
-        Raises
-        ------
-        InputError, SolverError
-            As `models.simulation.prepare`.
+        Raises InputError, SolverError as `models.simulation.prepare`.
         """
         if options.duration is not None:
             scenario = replace(scenario, duration=options.duration)
@@ -266,10 +263,7 @@ def simulate(
 def seeds_of(owner: str, seeds: int | Sequence[int]) -> tuple[int, ...]:
     """Return the seeds: 0 to n - 1, or those given.
 
-    Raises
-    ------
-    InputError
-        If there is none, one is negative, or one comes twice.
+    Raises InputError if there is none, one is negative, or one comes twice.
     """
     if isinstance(seeds, int):
         check_range(owner, "seeds", seeds, low=1)
@@ -283,10 +277,8 @@ def seeds_of(owner: str, seeds: int | Sequence[int]) -> tuple[int, ...]:
 def seconds_of(owner: str, value: float | str, *, high: float, positive: bool = True) -> float:
     """Return a time that was given as a number [s] or as a text with a unit.
 
-    Raises
-    ------
-    InputError
-        If it is none, or not above 0 (at least 0 unless `positive`) and up to the highest.
+    Raises InputError if it is none, or not above 0 (at least 0 unless `positive`) and up to the
+    highest.
     """
     try:
         return float(Quantity("time", 0.0, high, open_low=positive).read(value))

@@ -85,10 +85,7 @@ class Scene:
     def of(cls, run: Run, window: Window, scenario: Scenario | None = None) -> Scene:
         """Return the scene of a part of a run; the scenario says where the water is.
 
-        Raises
-        ------
-        InputError
-            If the run has no stored samples in that part.
+        Raises InputError if the run has no stored samples in that part.
         """
         rows = window.rows(run.time)
         time = run.time[rows]
@@ -143,10 +140,7 @@ def strip(run: Run, scenario: Scenario | None = None) -> Figure:
     They are of some waves about the worst moment, or of all of an operation.  Heights [m] over time
     [s]; the scenario says where the water's surface is.
 
-    Raises
-    ------
-    InputError
-        If the run has no stored samples.
+    Raises InputError if the run has no stored samples.
     """
     period = run.statistics["hook.heave"].period
     waves = max(_WAVES * (10.0 if math.isnan(period) else period), 5.0)

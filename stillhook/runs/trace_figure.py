@@ -59,10 +59,7 @@ def traces(run: Run, window: Window | None = None) -> Figure:
 
     That is by default `stillhook.runs.window.window_of`.
 
-    Raises
-    ------
-    InputError
-        If the run has no stored samples.
+    Raises InputError if the run has no stored samples.
     """
     if run.time.size < 2:
         raise InputError(f"traces: the run with seed {run.seed} has no time traces to draw")

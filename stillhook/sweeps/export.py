@@ -33,10 +33,7 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
 def check_writable(path: str | Path) -> Path:
     """Return the path of a result, of a kind that is known and in a folder that is there.
 
-    Raises
-    ------
-    InputError
-        If it is not.
+    Raises InputError if it is not.
     """
     place = Path(path)
     pick("sweep", "ending of a result", ENDINGS, (place.suffix,))
@@ -51,10 +48,7 @@ def write_result(result: xr.Dataset, path: str | Path) -> Path:
     The path ends in ``.csv``, ``.parquet``, ``.nc`` or ``.zarr``.  A table has a first line with
     the names; units are in the metadata of Parquet, NetCDF and Zarr.
 
-    Raises
-    ------
-    InputError
-        If the ending is another, it cannot be written, or zarr is not installed.
+    Raises InputError if the ending is another, it cannot be written, or zarr is not installed.
     """
     place = check_writable(path)
     if place.suffix == ".csv":

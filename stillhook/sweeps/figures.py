@@ -183,10 +183,7 @@ def scatter_matrix(result: xr.Dataset, names: Sequence[str] | None = None) -> Fi
     Names are those of coordinates and variables; by default what varied, those that the payload's
     motion hangs on most if there are many, and payload rms and M_s.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown.
+    Raises InputError if a name is unknown.
     """
     chosen = _chosen(result) if names is None else list(names)
     for name in chosen:

@@ -103,10 +103,7 @@ def places_of(store: str | Path) -> tuple[Path, Path]:
 
     A store is a folder with both, or that file, with the journal beside it.
 
-    Raises
-    ------
-    InputError
-        If the folder cannot be made, or the file is there without a journal.
+    Raises InputError if the folder cannot be made, or the file is there without a journal.
     """
     place = Path(store)
     if place.suffix not in ENDINGS:
@@ -123,11 +120,8 @@ def places_of(store: str | Path) -> tuple[Path, Path]:
 def stored_question(store: str | Path) -> tuple[TimeQuestion, Draw]:
     """Return the question of a stored sweep, and how its cases are drawn.
 
-    Raises
-    ------
-    InputError
-        If there is none, or it cannot be asked again: its controller was Python code, or
-        something is missing.
+    Raises InputError if there is none, or it cannot be asked again: its controller was Python code,
+    or something is missing.
     """
     path, _ = places_of(store)
     header, source = question_in(path, _WHAT), str(path)
@@ -150,10 +144,7 @@ class Results:
     The template is the result with nothing in it yet: coordinates, variables along "case",
     attributes with the header.  Without a path nothing is kept.
 
-    Raises
-    ------
-    InputError
-        As for `Journal`.
+    Raises InputError as for `Journal`.
     """
 
     def __init__(self, template: xr.Dataset, path: Path | None = None) -> None:

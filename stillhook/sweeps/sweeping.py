@@ -232,10 +232,7 @@ def resume_sweep(
 def case_of(design: object, case: Case | None) -> Case:
     """Return the nominal case: the one given, or that of the design.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises InputError if there is none.
     """
     own = design[1] if isinstance(design, tuple) and len(design) == 2 else design
     found = case if case is not None else getattr(own, "case", None)
@@ -250,10 +247,7 @@ def spread_of(
 ) -> Spread:
     """Return the spread that is meant.
 
-    Raises
-    ------
-    InputError
-        If it is none.
+    Raises InputError if it is none.
     """
     if given is None:
         from .usual import usual_spread

@@ -131,10 +131,7 @@ class TimeQuestion:
     def do(self, task: CaseTask, progress: Progress | None = None) -> CaseResult:
         """Return what comes of a case; what is wrong with it is part of the answer.
 
-        Raises
-        ------
-        KeyboardInterrupt
-            If the run was interrupted: half a run is worth nothing.
+        Raises KeyboardInterrupt if the run was interrupted: half a run is worth nothing.
         """
         began = clock.perf_counter()
         with warnings.catch_warnings(), one_thread():
@@ -154,12 +151,8 @@ class TimeQuestion:
     def run(self, task: CaseTask, progress: Progress | None = None) -> Run:
         """Return the whole run of a case, with its traces.
 
-        Raises
-        ------
-        InputError, SynthesisError, SolverError
-            If there is no such case, or no controller for it.
-        KeyboardInterrupt
-            If it was interrupted.
+        Raises InputError, SynthesisError, SolverError if there is no such case, or no controller
+        for it; KeyboardInterrupt if it was interrupted.
         """
         case = self.case.replace(task.changes) if task.changes else self.case
         controller = self.controller(case, task)

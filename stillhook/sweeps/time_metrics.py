@@ -116,10 +116,7 @@ METRICS: Mapping[str, Metric] = MappingProxyType(
 def names_of(wanted: Sequence[str] | None) -> tuple[str, ...]:
     """Return the metrics that are wanted, all of them by default.
 
-    Raises
-    ------
-    InputError
-        If one is unknown.
+    Raises InputError if one is unknown.
     """
     if wanted is None:
         return tuple(METRICS)

@@ -67,10 +67,7 @@ class SweepSummary:
     def of(cls, result: xr.Dataset) -> SweepSummary:
         """Return the summary of a result.
 
-        Raises
-        ------
-        InputError
-            If no case of it was run.
+        Raises InputError if no case of it was run.
         """
         ran = np.ones(result.sizes["case"], np.bool_)
         statuses: dict[str, int] = {}

@@ -42,10 +42,7 @@ class OutputFolder:
     ) -> OutputFolder:
         """Return the folder, made if need be and known to be writable; one that is, as it is.
 
-        Raises
-        ------
-        InputError
-            If it cannot be made, or no file can be written into it.
+        Raises InputError if it cannot be made, or no file can be written into it.
         """
         if isinstance(path, OutputFolder):
             return path
@@ -66,10 +63,7 @@ class OutputFolder:
     def at(self, name: str) -> Path:
         """Return where a file goes, with the folder made that its name may begin with.
 
-        Raises
-        ------
-        InputError
-            If that folder cannot be made.
+        Raises InputError if that folder cannot be made.
         """
         path = self.path / name
         if not path.parent.is_dir():
@@ -79,10 +73,7 @@ class OutputFolder:
     def write(self, name: str, content: str | bytes) -> Path:
         """Write a file under a temporary name, then rename it; return its path.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written.
+        Raises InputError if it cannot be written.
         """
         data = content.encode("utf-8") if isinstance(content, str) else content
         path = replace_atomically(self.at(name), lambda place: place.write_bytes(data))

@@ -435,10 +435,7 @@ def rms_limits(limits: Sequence[Limit], period: float) -> dict[str, float]:
     |static| + loss + k sigma <= bound with k = sqrt(2 ln(T/T_z)), and sqrt(static^2 + loss^2 +
     sigma^2) <= bound.  T_z is the signals' period [s].
 
-    Raises
-    ------
-    InputError
-        If a limit is not above the static load.
+    Raises InputError if a limit is not above the static load.
     """
     found: dict[str, float] = {}
     for limit in limits:

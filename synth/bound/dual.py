@@ -43,10 +43,7 @@ _HAIR = 0.5  # in the logarithm of a multiplier that is at most a millionth of t
 def shaped_plant(plant: LinearPlant, sources: Mapping[str, ShapingFilter | float]) -> LinearPlant:
     """Return `synth.structures.shaped`, its white noises checked.
 
-    Raises
-    ------
-    InputError
-        If a white noise has a rate that acts on the plant too.
+    Raises InputError if a white noise has a rate that acts on the plant too.
     """
     for name, source in sources.items():
         rates = [plant.disturbances.index(r) for r, of in plant.rates.items() if of == name]
@@ -160,11 +157,8 @@ class Dual:
     def at(self, multipliers: FloatArray) -> DualPoint:
         """Return the LQG optimum for multipliers, (m,).
 
-        Raises
-        ------
-        SolverError
-            If the regulator's Riccati equation has no stabilising solution, or rounding has left
-            a variance below zero.
+        Raises SolverError if the regulator's Riccati equation has no stabilising solution, or
+        rounding has left a variance below zero.
         """
         plant, kalman = self.plant, self.estimator
         charge = self.charge(multipliers)

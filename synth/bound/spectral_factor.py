@@ -118,12 +118,8 @@ def spectral_factor(disturbance: Disturbance, order: int = 8) -> SpectralFactor:
     It has `order` states, even, 2 to 12, or fewer where they are enough; the disturbance is not
     white.
 
-    Raises
-    ------
-    InputError
-        If the order is out of range or the spectrum holds no variance.
-    SolverError
-        If no fit converges.
+    Raises InputError if the order is out of range or the spectrum holds no variance; SolverError if
+    no fit converges.
     """
     band = disturbance.band or _occupied(disturbance)
     if disturbance.band is None:

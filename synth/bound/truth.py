@@ -227,10 +227,7 @@ def controller_rms(
 ) -> dict[str, float]:
     """Return what a controller makes of outputs on true spectra and exact delays, rms by name.
 
-    Raises
-    ------
-    SynthesisError
-        If its loop is unstable.
+    Raises SynthesisError if its loop is unstable.
     """
     law = LawMatrices.of(controller, plant)
     rational = plant.without_delays(_PADE, at="measurements")

@@ -73,10 +73,7 @@ class Contour:
         Beyond the ends of the periods (n,) [s] nothing is known: NaN.  Without headings (n,) [rad]
         it is the best of the contour at each period.
 
-        Raises
-        ------
-        InputError
-            If headings are given and the contour has none, or does not reach them.
+        Raises InputError if headings are given and the contour has none, or does not reach them.
         """
         finite, along = np.minimum(self.limit, self.highest), self._period_shares(periods)
         if headings is None:
@@ -112,10 +109,7 @@ def heading_shares(axis: FloatArray | None, headings: npt.ArrayLike) -> FloatArr
 
     Between them it is linear.
 
-    Raises
-    ------
-    InputError
-        If there is no axis, or it neither goes round nor reaches what is wanted.
+    Raises InputError if there is no axis, or it neither goes round nor reaches what is wanted.
     """
     if axis is None:
         raise InputError("operability: this contour has no headings")

@@ -27,10 +27,7 @@ def drum_layer(case: Case) -> tuple[int, int]:
 
     The bare drum is 1; both are 0 where the case gives a radius instead of layers.
 
-    Raises
-    ------
-    InputError
-        If the drum does not hold so much rope.
+    Raises InputError if the drum does not hold so much rope.
     """
     drum, length = case.winch.drum, case.rope.paid_out
     if drum.radius is not None:

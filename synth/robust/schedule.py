@@ -102,10 +102,7 @@ class GainSchedule:
     def at(self, length: float) -> dict[str, float]:
         """Return the gains ``A`` and by name at a length [m].
 
-        Raises
-        ------
-        InputError
-            If the length lies beyond the nodes: a spline is not to be extrapolated.
+        Raises InputError if the length lies beyond the nodes: a spline is not to be extrapolated.
         """
         low, high = float(self.lengths[0]), float(self.lengths[-1])
         check_range("gain schedule", "length", length, low=low, high=high, unit="m")
@@ -145,10 +142,7 @@ class GainSchedule:
     def from_yaml(cls, text: str, case: Case, source: str = "schedule") -> GainSchedule:
         """Return a schedule from its YAML text; what it does has to be looked at again.
 
-        Raises
-        ------
-        InputError
-            If the text is not a schedule.
+        Raises InputError if the text is not a schedule.
         """
         from models.casefile import read_yaml
 

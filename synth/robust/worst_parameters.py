@@ -230,10 +230,8 @@ def robustness(
 class _Box:
     """The ranges as a box: a point has a number from -1 to 1 for each, more beyond its range.
 
-    Raises
-    ------
-    InputError
-        If there is nothing, a path is unknown or given twice, or a width makes no sense.
+    Raises InputError if there is nothing, a path is unknown or given twice, or a width makes no
+    sense.
     """
 
     def __init__(self, design: Design, uncertainty: Mapping[str, float | str]) -> None:

@@ -35,13 +35,8 @@ def derivative(
     The function may refuse values (`InputError`) on one side of `at`, where a range ends: then the
     differences are one-sided, of the same order.  The step is a share of `at`.
 
-    Raises
-    ------
-    InputError
-        If `at` is zero, or the function refuses both sides.
-    StepError
-        If the function steps within the differences, as a drum's radius does where one more turn
-        fits into a layer.
+    Raises InputError if `at` is zero, or the function refuses both sides; StepError if the function
+    steps within the differences, as a drum's radius does where one more turn fits into a layer.
     """
     if at == 0.0:
         raise InputError("derivative: the step is a share of the value, which must not be zero")
@@ -65,12 +60,8 @@ def sided_derivatives(
 
     The function gives logarithms, (n,), continuous; as for `derivative` it may refuse a side.
 
-    Raises
-    ------
-    InputError
-        If the function refuses both sides.
-    StepError
-        If the function is neither smooth nor has it a corner exactly there.
+    Raises InputError if the function refuses both sides; StepError if the function is neither
+    smooth nor has it a corner exactly there.
     """
     step, here = _STEP * abs(at), function(at)
     sides = []

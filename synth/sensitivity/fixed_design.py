@@ -109,10 +109,7 @@ class FixedDesign:
 
         None at the end of the number's range.  The amplifier ``gains.A`` moves all gains.
 
-        Raises
-        ------
-        InputError
-            If there is no such number or gain.
+        Raises InputError if there is no such number or gain.
         """
         if path.startswith("gains."):
             gain = path.removeprefix("gains.")

@@ -37,10 +37,7 @@ def evaluate_rows(
     `synth.sweeps.frequency.frequency_sweep`, or ``modulus_margin``, 1/M_s: near the edge of
     stability M_s is all tail, and its variance that of a few cases.
 
-    Raises
-    ------
-    InputError
-        If the spread does not fit the case, or there is no such figure.
+    Raises InputError if the spread does not fit the case, or there is no such figure.
     """
     from ..sweeps import FrequencyEngine
 

@@ -78,10 +78,8 @@ def read_catalogue(
 
     They must be of the kind of the case's own, AC or DC.
 
-    Raises
-    ------
-    InputError
-        If the table cannot be read, a column is missing or unknown, or a figure is wrong.
+    Raises InputError if the table cannot be read, a column is missing or unknown, or a figure is
+    wrong.
     """
     source = str(motors) if isinstance(motors, str | Path) else "motors"
     rows = _rows(Path(motors)) if isinstance(motors, str | Path) else list(motors)

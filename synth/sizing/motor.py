@@ -66,10 +66,7 @@ class MotorData:
 def motor_changes(case: Case, scale: float) -> dict[str, float]:
     """Return the changes by dotted path that make a case's motor `scale` times as large, by torque.
 
-    Raises
-    ------
-    InputError
-        If the scale is not above 0.
+    Raises InputError if the scale is not above 0.
     """
     check_range("motor", "scale", scale, low=0.0, open_low=True)
     motor, drive, box = case.winch.motor, case.winch.drive, case.winch.gearbox

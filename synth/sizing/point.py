@@ -223,10 +223,7 @@ def target_of(target: float | str, hook_rms: float) -> float:
     It is a number in metres, a text with a unit of length (``20 mm``), with ``%`` of the hook's rms
     motion [m], or with ``dB`` below it.
 
-    Raises
-    ------
-    InputError
-        If it is none of these, or not between 0 and the hook's motion.
+    Raises InputError if it is none of these, or not between 0 and the hook's motion.
     """
     text = target.strip() if isinstance(target, str) else ""
     try:

@@ -108,10 +108,7 @@ def spread_of(dataset: xr.Dataset) -> Spread:
 def law_of(dataset: xr.Dataset, number: int) -> tuple[str, dict[str, float]]:
     """Return the structure and the parameters of one entry along "case"; empty without a design.
 
-    Raises
-    ------
-    InputError
-        As `case_of`.
+    Raises InputError as `case_of`.
     """
     law = _question(dataset)["controller"].get("law") or {}
     spread = spread_of(dataset)
@@ -124,10 +121,7 @@ def case_of(dataset: xr.Dataset, number: int) -> Case:
 
     Faults, which are no part of a case, are left out.
 
-    Raises
-    ------
-    InputError
-        If there is no such case, or the dataset is not one of a sweep.
+    Raises InputError if there is no such case, or the dataset is not one of a sweep.
     """
     spread = spread_of(dataset)
     row = _row(dataset, spread, number)

@@ -225,10 +225,7 @@ class DesignRows:
     def solve(self, rows: FloatArray) -> SolvedRows:
         """Return drag, stability, M_s and variances of rows, (n, d).
 
-        Raises
-        ------
-        InputError
-            If a row is no valid case.
+        Raises InputError if a row is no valid case.
         """
         loops = self._loops(rows)
         solved = SolvedRows(loops, self._orders, pairs=self._pairs)

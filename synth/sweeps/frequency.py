@@ -109,10 +109,7 @@ class FrequencyEngine:
         A row's numbers do not depend on the rows beside it, but for the last digits.  Their values
         are SI, (n, d), in the order of `spread.paths`.
 
-        Raises
-        ------
-        InputError
-            If rows do not fit the spread, or a value is out of its range.
+        Raises InputError if rows do not fit the spread, or a value is out of its range.
         """
         table = np.atleast_2d(np.asarray(rows, dtype=np.float64))
         if table.shape[1] != len(self.spread.paths):
@@ -156,10 +153,7 @@ class FrequencyEngine:
         Nothing but the chunk at hand is kept, so that the number of cases has no bound but time.
         Parameters are those of `frequency_sweep`.
 
-        Raises
-        ------
-        InputError
-            If the samples or a case are not valid.
+        Raises InputError if the samples or a case are not valid.
         """
         size = int(check_range("sweep", "chunk", chunk or _CHUNK, low=1))
         total = self.spread.count(samples, sampling)

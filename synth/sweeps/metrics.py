@@ -87,10 +87,7 @@ METRICS: Mapping[str, FrequencyMetric] = {
 def chosen_metrics(names: Sequence[str] | None, *, dc: bool) -> tuple[FrequencyMetric, ...]:
     """Return the metrics of a sweep.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown, or the motor has none of it.
+    Raises InputError if a name is unknown, or the motor has none of it.
     """
     wanted = DEFAULT if names is None else tuple(dict.fromkeys(n for n in names if n != "stable"))
     for name in wanted:

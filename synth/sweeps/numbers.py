@@ -167,10 +167,7 @@ def numbers_of(
 
     `columns` tells whether they do; if left out all rows are compared with their checked cases.
 
-    Raises
-    ------
-    InputError
-        If a row is no valid case; its values are named.
+    Raises InputError if a row is no valid case; its values are named.
     """
     found: Numbers = {}
     if columns is not False:

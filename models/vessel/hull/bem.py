@@ -67,10 +67,7 @@ _FORMAT = 4  # goes up when what is computed from the same inputs changes
 def capytaine() -> Any:
     """Return the imported package.
 
-    Raises
-    ------
-    InputError
-        If it is not installed, or older than version 3.
+    Raises InputError if it is not installed, or older than version 3.
     """
     try:
         import capytaine as found

@@ -100,10 +100,7 @@ class Hydrodynamics(ReadOnlyArrays):
     def resampled(self, omega: npt.ArrayLike) -> Hydrodynamics:
         """Return the coefficients at other frequencies (n,) [rad/s], by cubic splines.
 
-        Raises
-        ------
-        InputError
-            If a frequency lies outside the table.
+        Raises InputError if a frequency lies outside the table.
         """
         from scipy.interpolate import CubicSpline  # here: whoever reads RAOs needs none of it
 

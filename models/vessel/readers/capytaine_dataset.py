@@ -155,10 +155,7 @@ class CapytaineData:
 
         Of the wanted axes `frequency` stands for the file's own, `dof` for that of the motions.
 
-        Raises
-        ------
-        InputError
-            If the variable or an axis is missing, or has another axis beside those.
+        Raises InputError if the variable or an axis is missing, or has another axis beside those.
         """
         if not self.has(name):
             raise InputError(f"{self.owner}: the variable {name} is missing; it has {self.names()}")

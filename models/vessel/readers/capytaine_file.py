@@ -47,10 +47,7 @@ def parse_capytaine(
     if the file has them.  They are those of the rotation centre, which `origin` is where the file
     does not tell it; inertia and stiffness are about it, surge to yaw.
 
-    Raises
-    ------
-    InputError
-        If the file is not one of Capytaine's, is damaged, or lacks what it takes.
+    Raises InputError if the file is not one of Capytaine's, is damaged, or lacks what it takes.
     """
     body = None if body is None else str(body)
     if roll_damping is not None:

@@ -61,11 +61,8 @@ def looks_like_csv(text: str) -> bool:
 def parse_csv(owner: str, text: str) -> VesselRaos:
     """Return the table of a CSV file.
 
-    Raises
-    ------
-    InputError
-        If a key or a column is unknown, a line has another number of columns than the header, a
-        word is no number, or rows are missing.
+    Raises InputError if a key or a column is unknown, a line has another number of columns than the
+    header, a word is no number, or rows are missing.
     """
     told, notes, body, start = _head(owner, text)
     (first, turn, columns), rows = _rows(owner, body, start)

@@ -207,10 +207,7 @@ def bundled_vessels() -> tuple[tuple[str, str], ...]:
 def file_format_of(owner: str, data: bytes) -> str:
     """Return which of :data:`FORMATS` the contents of a file are.
 
-    Raises
-    ------
-    InputError
-        If they are none of them.
+    Raises InputError if they are none of them.
     """
     head = data[:8]
     if head.startswith(_HDF5):

@@ -44,10 +44,8 @@ def parse_mss(
 
     The origin is where the point CO of MSS is, in the frame that the hook is given in [m].
 
-    Raises
-    ------
-    InputError
-        If the file is no MATLAB file, is cut off, or holds no vessel with motion RAOs.
+    Raises InputError if the file is no MATLAB file, is cut off, or holds no vessel with motion
+    RAOs.
     """
     vessel = _structure(owner, data)
     rao = _field(owner, vessel, "vessel", "motionRAO")

@@ -79,10 +79,7 @@ def parse_netcdf(owner: str, data: bytes) -> VesselRaos:
     It is read as the HDF5 file that it is, without the layers that label data sets: they are slow
     to import, and complain on their own when a damaged file cannot be opened.
 
-    Raises
-    ------
-    InputError
-        If it is another file.
+    Raises InputError if it is another file.
     """
     import h5py  # type: ignore[import-untyped]
 

@@ -62,11 +62,8 @@ def parse_orcaflex(
 
     Arguments are those of `read_raos`; by default the first that has RAOs.
 
-    Raises
-    ------
-    InputError
-        If the file is something else, cut off, lacks a convention or knows one that OrcaFlex does
-        not have, or the vessel type, the draught or its RAOs are not there.
+    Raises InputError if the file is something else, cut off, lacks a convention or knows one that
+    OrcaFlex does not have, or the vessel type, the draught or its RAOs are not there.
     """
     units = _UNITS.search(text)
     if units is not None and units[1] != "SI":
@@ -315,10 +312,7 @@ def _rows_of_text(lines: list[str]) -> FloatArray | None:
 def _table_of(owner: str, entry: object, tables: list[FloatArray]) -> FloatArray:
     """Return the table that an entry of a vessel type points at, or holds itself.
 
-    Raises
-    ------
-    InputError
-        If it is no table of 13 columns of finite numbers.
+    Raises InputError if it is no table of 13 columns of finite numbers.
     """
     if isinstance(entry, str) and entry.startswith(_MARK):
         index = entry[len(_MARK) :].strip()

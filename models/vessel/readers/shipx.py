@@ -65,10 +65,8 @@ class _Lines:
 def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselRaos:
     """Return the motions at one speed; arguments are those of `read_raos`.
 
-    Raises
-    ------
-    InputError
-        If the file is something else, is cut off, has more than it says, or lacks the speed.
+    Raises InputError if the file is something else, is cut off, has more than it says, or lacks the
+    speed.
     """
     head = text.splitlines()[:_HEADER]
     if len(head) < _HEADER or not looks_like_shipx(text):
@@ -138,10 +136,7 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
 def chosen_speed(owner: str, speeds: list[float], wanted: float | None) -> tuple[float, list[str]]:
     """Return the speed of a file that is asked for, the slowest if none is, and a note of it.
 
-    Raises
-    ------
-    InputError
-        If the file has no such speed.
+    Raises InputError if the file has no such speed.
     """
     near = 0.0 if wanted is None else wanted
     chosen = min(speeds, key=lambda v: abs(v - near))

@@ -61,11 +61,8 @@ def parse_wamit(
     The vessel is called after the file.  WAMIT's incident wave has zero phase at the body's origin
     unless the body was moved off the global one.
 
-    Raises
-    ------
-    InputError
-        If a line is no line of a `.4` file or contradicts itself, rows are missing, or the body is
-        not there.
+    Raises InputError if a line is no line of a `.4` file or contradicts itself, rows are missing,
+    or the body is not there.
     """
     rows = _rows(owner, text)
     notes = ["WAMIT .4: time factor e^{+i omega t}, z up, headings towards: as here"]

@@ -59,10 +59,7 @@ class SimulationRequest:
 def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
     """Return what the arguments ask for.
 
-    Raises
-    ------
-    InputError
-        If any of it is wrong.
+    Raises InputError if any of it is wrong.
     """
     from models.operation import scenario_named
     from models.simulation import SimulationOptions
@@ -105,10 +102,7 @@ def parse_controllers(text: str) -> tuple[str, ...]:
 
     All are those that need no tuning: the predictive ones have to be named.
 
-    Raises
-    ------
-    InputError
-        If there is no such controller, or one is named twice.
+    Raises InputError if there is no such controller, or one is named twice.
     """
     known = tuple(CONTROLLER_TEXTS)
     if text == "all":

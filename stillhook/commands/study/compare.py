@@ -23,10 +23,7 @@ _MANY = 10_000  # seeds: more than anybody wants on purpose
 def _controllers(option: str, text: str) -> list[object]:
     """Return the contenders of a text: names, and files of designs.
 
-    Raises
-    ------
-    InputError
-        If a file is no design; unknown names are told where they are looked up.
+    Raises InputError if a file is no design; unknown names are told where they are looked up.
     """
     from ...designs import load_design
 

@@ -196,10 +196,7 @@ def _resumed(arguments: argparse.Namespace) -> Swept:
 def given_pilot(case: Case, arguments: argparse.Namespace) -> object:
     """Return what is tried: a controller's name, or a design on the case.
 
-    Raises
-    ------
-    InputError
-        If there is none, or a name goes with the frequency domain.
+    Raises InputError if there is none, or a name goes with the frequency domain.
     """
     if arguments.controller is None:
         return given_design(case, arguments)
@@ -214,10 +211,7 @@ def given_pilot(case: Case, arguments: argparse.Namespace) -> object:
 def given_spread(arguments: argparse.Namespace) -> Spread | None:
     """Return what varies; None for the usual.
 
-    Raises
-    ------
-    InputError
-        If a file is none, or a text is not of the form PATH=RANGE.
+    Raises InputError if a file is none, or a text is not of the form PATH=RANGE.
     """
     from ...sweeps import fault_spread
 
@@ -245,10 +239,7 @@ def given_spread(arguments: argparse.Namespace) -> Spread | None:
 def parse_ranges(texts: list[str]) -> dict[str, Any]:
     """Return even distributions from texts PATH=WIDTH or PATH=LOW..HIGH.
 
-    Raises
-    ------
-    InputError
-        If a text has neither form, or a path comes twice.
+    Raises InputError if a text has neither form, or a path comes twice.
 
     Examples
     --------
@@ -277,10 +268,7 @@ def _number(text: str) -> float | str:
 def _only_in_time(arguments: argparse.Namespace) -> None:
     """Refuse options that would do nothing.
 
-    Raises
-    ------
-    InputError
-        If there is one.
+    Raises InputError if there is one.
     """
     wrong = [word for word in changed_words(arguments, ARGUMENTS) if word in _IN_TIME]
     if wrong:

@@ -31,10 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
 def written(arguments: argparse.Namespace, text: str) -> Path:
     """Write a text into the file that was named, and return its path.
 
-    Raises
-    ------
-    InputError
-        If it exists and is not to be overwritten.
+    Raises InputError if it exists and is not to be overwritten.
     """
     from models import write_text_atomically
     from models.basics import InputError
