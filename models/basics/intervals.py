@@ -21,26 +21,16 @@ from .checks import InputError, check_finite, check_range
 
 @dataclass(frozen=True, kw_only=True)
 class Interval:
-    """A mean over seeds with its confidence interval, in `unit`.
+    """A mean over seeds with its confidence interval, in `unit`."""
 
-    Attributes
-    ----------
-    mean, low, high
-        The mean and the ends of its interval; the ends are NaN with a single value.
-    standard_deviation
-        Of the values, with n - 1 in the denominator; NaN with a single value.
-    count
-        Number of values; runs in which the quantity did not occur have none.
-    unit
-        The unit.
-    """
-
+    #: The mean and the ends of its interval; the ends are NaN with a single value.
     mean: float
     low: float
     high: float
+    #: Of the values, with n - 1 in the denominator; NaN with a single value.
     standard_deviation: float
-    count: int
-    unit: str = ""
+    count: int  #: Number of values; runs in which the quantity did not occur have none.
+    unit: str = ""  #: The unit.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,20 +50,11 @@ class Share:
 
 @dataclass(frozen=True, kw_only=True)
 class FallTime:
-    """How long runs keep lock.
+    """How long runs keep lock."""
 
-    Attributes
-    ----------
-    falls
-        Number of runs that lost lock.
-    exposure
-        Time that all runs together kept it [s].
-    rate, rate_low, rate_high
-        Falls per second if they come at a constant rate, and its interval [1/s].
-    """
-
-    falls: int
-    exposure: float
+    falls: int  #: Number of runs that lost lock.
+    exposure: float  #: Time that all runs together kept it [s].
+    #: Falls per second if they come at a constant rate, and its interval [1/s].
     rate: float
     rate_low: float
     rate_high: float

@@ -57,25 +57,15 @@ def speed_along(case: Case, headings: npt.ArrayLike) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Encounter(ReadOnlyArrays):
-    """How a vessel that moves through the water meets the waves.
+    """How a vessel that moves through the water meets the waves."""
 
-    Attributes
-    ----------
-    along
-        Speed of the vessel through the water along the waves of each heading, positive where it
-        runs with them (n,) [m/s].
-    weights
-        Share of the sea's energy in each heading (n,).
-    operators
-        Heave of the hook in each heading (n), or None: one for all, see :class:`HookMotion`.
-    depth
-        Water depth [m].
-    """
-
+    #: Speed of the vessel through the water along the waves of each heading, positive where it runs
+    #: with them (n,) [m/s].
     along: FloatArray
-    weights: FloatArray
+    weights: FloatArray  #: Share of the sea's energy in each heading (n,).
+    #: Heave of the hook in each heading (n), or None: one for all, see :class:`HookMotion`.
     operators: tuple[HeaveRao, ...] | None = None
-    depth: float = math.inf
+    depth: float = math.inf  #: Water depth [m].
 
     @classmethod
     def from_case(cls, case: Case, *, hook: bool = True) -> Encounter | None:
@@ -172,21 +162,11 @@ class Encounter(ReadOnlyArrays):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MetSpectrum:
-    """A spectrum by its energy: a monotone curve through the sum of energy up to each frequency.
+    """A spectrum by its energy: a monotone curve through the sum of energy up to each frequency."""
 
-    Attributes
-    ----------
-    knots
-        Frequencies, strictly ascending (m,) [rad/s].
-    energy
-        Variance up to each knot, from zero on (m,) [m^2].
-    slope
-        Density at each knot (m,) [m^2 s/rad].
-    """
-
-    knots: FloatArray
-    energy: FloatArray
-    slope: FloatArray
+    knots: FloatArray  #: Frequencies, strictly ascending (m,) [rad/s].
+    energy: FloatArray  #: Variance up to each knot, from zero on (m,) [m^2].
+    slope: FloatArray  #: Density at each knot (m,) [m^2 s/rad].
 
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the one-sided variance density, zero outside the knots [m^2 s/rad]."""

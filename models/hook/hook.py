@@ -51,23 +51,14 @@ _SHARE_TO_WARN = 0.05
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HookRecord(ReadOnlyArrays):
-    """A time series of the hook's vertical motion, positive up.
+    """A time series of the hook's vertical motion, positive up."""
 
-    Attributes
-    ----------
-    time
-        Times from zero in equal steps (n,) [s].
-    displacement, velocity, acceleration
-        The motion and its exact derivatives (n,) [m], [m/s], [m/s2].
-    seed
-        The seed that it was drawn with.
-    """
-
-    time: FloatArray
+    time: FloatArray  #: Times from zero in equal steps (n,) [s].
+    #: The motion and its exact derivatives (n,) [m], [m/s], [m/s2].
     displacement: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
-    seed: int
+    seed: int  #: The seed that it was drawn with.
 
     @property
     def step(self) -> float:
@@ -84,15 +75,6 @@ class HookRecord(ReadOnlyArrays):
 class HookMotion:
     """Vertical motion of the hook in a sea.
 
-    Attributes
-    ----------
-    sea
-        The sea's spectrum.
-    rao
-        Heave of the hook per metre of wave.
-    encounter
-        How the waves are met on a vessel that moves through the water, if it does.
-
     Examples
     --------
     >>> sea = SeaSpectrum(kind="bretschneider-1975", significant_height=2.0, significant_period=8.0)
@@ -102,8 +84,9 @@ class HookMotion:
     0.5
     """
 
-    sea: SeaSpectrum
-    rao: HeaveRao
+    sea: SeaSpectrum  #: The sea's spectrum.
+    rao: HeaveRao  #: Heave of the hook per metre of wave.
+    #: How the waves are met on a vessel that moves through the water, if it does.
     encounter: Encounter | None = None
 
     @classmethod

@@ -21,17 +21,6 @@ from .hook import HookMotion, motion_statistics
 class HookDemand:
     """A hook's motion in figures, and what it asks of a winch that keeps the load still.
 
-    Attributes
-    ----------
-    moments
-        Spectral moments of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n].
-    tension
-        Static tension of all falls [N].
-    duration
-        Exposure time [s].
-    probability
-        Fractile of the extremes beside the most probable one.
-
     Examples
     --------
     >>> from models import load_case
@@ -42,10 +31,11 @@ class HookDemand:
     0.67
     """
 
+    #: Spectral moments of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n].
     moments: FloatArray
-    tension: float
-    duration: float = THREE_HOURS
-    probability: float = 0.9
+    tension: float  #: Static tension of all falls [N].
+    duration: float = THREE_HOURS  #: Exposure time [s].
+    probability: float = 0.9  #: Fractile of the extremes beside the most probable one.
 
     @classmethod
     def from_case(cls, case: Case, *, probability: float = 0.9) -> HookDemand:

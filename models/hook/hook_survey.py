@@ -50,34 +50,19 @@ _MOTIONS = ("displacement", "velocity", "acceleration")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HookSurvey(ReadOnlyArrays):
-    """Hook motion over side of the ship, heading and peak period.
+    """Hook motion over side of the ship, heading and peak period."""
 
-    Attributes
-    ----------
-    case
-        The case.
-    headings
-        Where the waves travel to (h,) [rad]; empty for a case with `heave_rao`, which holds for
-        one heading.
-    peak_periods
-        (t,) [s].
-    points
-        The hook's place, and the same place across the ship (s, 3) [m]; empty with `heave_rao`.
-    moments
-        Moments of order 0 to 8 of the displacement (s, h, t, 9); s = h = 1 with `heave_rao`.
-    steep
-        Whether a sea of this peak period would be steeper than breaking (t,).
-    own
-        The figures of the case as it stands.
-    """
-
-    case: Case
+    case: Case  #: The case.
+    #: Where the waves travel to (h,) [rad]; empty for a case with `heave_rao`, which holds for one
+    #: heading.
     headings: FloatArray
-    peak_periods: FloatArray
+    peak_periods: FloatArray  #: (t,) [s].
+    #: The hook's place, and the same place across the ship (s, 3) [m]; empty with `heave_rao`.
     points: tuple[Point, ...]
+    #: Moments of order 0 to 8 of the displacement (s, h, t, 9); s = h = 1 with `heave_rao`.
     moments: FloatArray
-    steep: BoolArray
-    own: HookDemand
+    steep: BoolArray  #: Whether a sea of this peak period would be steeper than breaking (t,).
+    own: HookDemand  #: The figures of the case as it stands.
 
     def rms(self, motion: str = "velocity") -> FloatArray:
         """Return deviations (s, h, t) of `displacement`, `velocity` or `acceleration` [SI]."""

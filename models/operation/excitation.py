@@ -141,23 +141,12 @@ class MotionSource(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
-    """A vertical motion, up positive, that is read in blocks.
+    """A vertical motion, up positive, that is read in blocks."""
 
-    Attributes
-    ----------
-    source
-        What it is, in a few words.
-    duration
-        From the first row to the last [s].
-    step
-        Time from row to row [s].
-    evaluate
-        Gives displacement, velocity and acceleration at `count` rows from row `start` on.
-    """
-
-    source: str
-    duration: float
-    step: float
+    source: str  #: What it is, in a few words.
+    duration: float  #: From the first row to the last [s].
+    step: float  #: Time from row to row [s].
+    #: Gives displacement, velocity and acceleration at `count` rows from row `start` on.
     evaluate: Callable[[int, int], MotionBlock]
 
     @property
@@ -202,21 +191,11 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class SineMotion:
-    """A sine, z = amplitude sin(2 pi t/period + phase).
+    """A sine, z = amplitude sin(2 pi t/period + phase)."""
 
-    Attributes
-    ----------
-    amplitude
-        Amplitude [m].
-    period
-        Period [s].
-    phase
-        Phase at the start [rad].
-    """
-
-    amplitude: float
-    period: float
-    phase: float = 0.0
+    amplitude: float  #: Amplitude [m].
+    period: float  #: Period [s].
+    phase: float = 0.0  #: Phase at the start [rad].
 
     def __post_init__(self) -> None:
         check_range("sine motion", "amplitude", self.amplitude, low=0.0, unit="m")

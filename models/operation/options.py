@@ -27,21 +27,11 @@ Default: TypeAlias = float | Callable[[Case], float]
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """A quantity that a scenario may be given.
+    """A quantity that a scenario may be given."""
 
-    Attributes
-    ----------
-    quantity
-        Kind and range.
-    default
-        Value in SI, or how it follows from the case.
-    text
-        What it is.
-    """
-
-    quantity: Quantity
-    default: Default
-    text: str
+    quantity: Quantity  #: Kind and range.
+    default: Default  #: Value in SI, or how it follows from the case.
+    text: str  #: What it is.
 
     def value(self, given: object, case: Case) -> float:
         """Return the value in SI: a number, a text with a unit, or None for the default.
@@ -55,21 +45,11 @@ class Option:
 
 @dataclass(frozen=True, kw_only=True)
 class WordOption:
-    """One of a few words that a scenario may be given.
+    """One of a few words that a scenario may be given."""
 
-    Attributes
-    ----------
-    words
-        The words, the default first.
-    text
-        What it is.
-    motion
-        Whether a source of motion may be given instead.
-    """
-
-    words: tuple[str, ...]
-    text: str
-    motion: bool = False
+    words: tuple[str, ...]  #: The words, the default first.
+    text: str  #: What it is.
+    motion: bool = False  #: Whether a source of motion may be given instead.
 
     def value(self, given: object, case: Case) -> object:
         """Return the word, the default if None is given, or the source of motion.
@@ -89,23 +69,13 @@ class WordOption:
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioRecipe:
-    """How a scenario of the library is made.
+    """How a scenario of the library is made."""
 
-    Attributes
-    ----------
-    description
-        What it is, in one line.
-    build
-        From the case and the options' values to the fields of a `Scenario` that are its own.
-    options
-        Its options by name.
-    warm_up, ramp
-        Defaults of the two options that every scenario has [s].
-    """
-
-    description: str
+    description: str  #: What it is, in one line.
+    #: From the case and the options' values to the fields of a `Scenario` that are its own.
     build: Callable[[Case, Values], dict[str, Any]]
-    options: Mapping[str, Option | WordOption]
+    options: Mapping[str, Option | WordOption]  #: Its options by name.
+    #: Defaults of the two options that every scenario has [s].
     warm_up: float = 0.0
     ramp: float = 0.0
 

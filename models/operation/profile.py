@@ -17,24 +17,12 @@ from ..basics import FloatArray, check_range
 
 @dataclass(frozen=True, kw_only=True)
 class Move:
-    """A move from rest to rest with a trapezoidal speed profile.
+    """A move from rest to rest with a trapezoidal speed profile."""
 
-    Attributes
-    ----------
-    start
-        When it begins [s].
-    distance
-        How far, up positive [m].
-    speed
-        Highest speed [m/s]; a short move does not reach it.
-    acceleration
-        Acceleration at the start, deceleration at the end [m/s2].
-    """
-
-    start: float
-    distance: float
-    speed: float
-    acceleration: float
+    start: float  #: When it begins [s].
+    distance: float  #: How far, up positive [m].
+    speed: float  #: Highest speed [m/s]; a short move does not reach it.
+    acceleration: float  #: Acceleration at the start, deceleration at the end [m/s2].
 
     def __post_init__(self) -> None:
         check_range("move", "start", self.start, low=0.0, unit="s")

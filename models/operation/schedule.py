@@ -21,24 +21,14 @@ _ROUNDING = 1e-9  # of a sample
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScheduleBlock:
-    """Rows of a schedule.
+    """Rows of a schedule."""
 
-    Attributes
-    ----------
-    time
-        Times from the start of the run (n,) [s].
-    reference
-        Displacement, velocity and acceleration asked of the payload (n, 3) [m, m/s, m/s2].
-    engage
-        Share of the controller's command that reaches the drive, beyond the static hold (n,) [-].
-    brake
-        1 while the brake is on (n,).
-    """
-
-    time: FloatArray
+    time: FloatArray  #: Times from the start of the run (n,) [s].
+    #: Displacement, velocity and acceleration asked of the payload (n, 3) [m, m/s, m/s2].
     reference: FloatArray
+    #: Share of the controller's command that reaches the drive, beyond the static hold (n,) [-].
     engage: FloatArray
-    brake: FloatArray
+    brake: FloatArray  #: 1 while the brake is on (n,).
 
 
 @dataclass(frozen=True, kw_only=True)

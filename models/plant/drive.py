@@ -51,33 +51,18 @@ _UNITS = {
 class DriveLimits:
     """Limits of motor and inverter at the motor's shaft or terminals; infinite where none.
 
-    Parameters
-    ----------
-    torque
-        Highest torque [N m].
-    current
-        Highest armature current of a DC motor [A].
-    voltage
-        Highest armature voltage of a DC motor [V].
-    speed
-        Highest speed [rad/s].
-    power
-        Highest shaft power, motoring or braking [W].
-    breakdown
-        Breakdown torque times speed squared [N m rad2/s2].
-
     Raises
     ------
     InputError
         If a limit is not above zero.
     """
 
-    torque: float = math.inf
-    current: float = math.inf
-    voltage: float = math.inf
-    speed: float = math.inf
-    power: float = math.inf
-    breakdown: float = math.inf
+    torque: float = math.inf  #: Highest torque [N m].
+    current: float = math.inf  #: Highest armature current of a DC motor [A].
+    voltage: float = math.inf  #: Highest armature voltage of a DC motor [V].
+    speed: float = math.inf  #: Highest speed [rad/s].
+    power: float = math.inf  #: Highest shaft power, motoring or braking [W].
+    breakdown: float = math.inf  #: Breakdown torque times speed squared [N m rad2/s2].
 
     def __post_init__(self) -> None:
         for name, unit in _UNITS.items():
@@ -112,21 +97,14 @@ class DriveLimits:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MotorEquations:
-    """What the motor gives to the plant's equations.
+    """What the motor gives to the plant's equations."""
 
-    Parameters
-    ----------
-    torque, current
-        Motor torque [N m] and armature current [A] (an AC motor's is its torque).
-    derivative
-        Derivative of the motor's own state, if it has one, by the state's name.
-    applied
-        The command that would have given the same without any limit [unit of the command].
-    """
-
+    #: Motor torque [N m] and armature current [A] (an AC motor's is its torque).
     torque: ca.SX
     current: ca.SX
+    #: Derivative of the motor's own state, if it has one, by the state's name.
     derivative: Mapping[str, ca.SX]
+    #: The command that would have given the same without any limit [unit of the command].
     applied: ca.SX
 
 

@@ -52,36 +52,6 @@ _HAIR = 1e-8  # relative distance at which 1/(s - pole) leaves a closed loop eig
 class LinearPlant(ReadOnlyArrays):
     """A linear, time-invariant plant with named signals and delayed measurements.
 
-    Parameters
-    ----------
-    A, B, E
-        State matrices, (n, n), (n, nu), (n, nw).
-    C, D, F
-        Measurement matrices, (ny, n), (ny, nu), (ny, nw); D and F default to zero.
-    Cz, Dz, Fz
-        Matrices of the performance outputs, (nz, n), (nz, nu), (nz, nw); without Cz there
-        are no outputs, Dz and Fz default to zero.
-    states, inputs, disturbances, measurements, outputs
-        Names, by default x1.., u1.., w1.., y1.., z1..
-    delays
-        Delay of each measurement [s], in order or by name; default 0.  Half of what `holds` says
-        is part of it.
-    holds
-        Time for which a reading of each measurement is held [s], in order or by name; default 0,
-        for none.  With T of that time and a delay d a response has the factor
-        exp(-s (d - T/2)) (1 - exp(-s T))/(s T), of phase -omega d: exact below the frequencies
-        that readings fold.
-    rates
-        Disturbances that are the time derivative of another one, {"rate": "of"}: their
-        column times s is added to that of the other one in every response.
-    units
-        Unit of a signal by name, for reports.
-    static
-        Value of a signal at the operating point by name, in its unit.
-    loss
-        How far a loss that switches with the direction of motion carries a signal to either side
-        of that value, by name, in its unit; nothing for others.
-
     Raises
     ------
     InputError
@@ -89,25 +59,39 @@ class LinearPlant(ReadOnlyArrays):
         delay is negative.
     """
 
+    #: State matrices, (n, n), (n, nu), (n, nw).
     A: FloatArray
     B: FloatArray
     E: FloatArray
+    #: Measurement matrices, (ny, n), (ny, nu), (ny, nw); D and F default to zero.
     C: FloatArray
     D: FloatArray
     F: FloatArray
+    #: Matrices of the performance outputs, (nz, n), (nz, nu), (nz, nw); without Cz there are no
+    #: outputs, Dz and Fz default to zero.
     Cz: FloatArray
     Dz: FloatArray
     Fz: FloatArray
+    #: Names, by default x1.., u1.., w1.., y1.., z1..
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     disturbances: tuple[str, ...]
     measurements: tuple[str, ...]
     outputs: tuple[str, ...]
+    #: Delay of each measurement [s], in order or by name; default 0.  Half of what `holds` says is
+    #: part of it.
     delays: tuple[float, ...]
+    #: Time for which a reading of each measurement is held [s], in order or by name; default 0, for
+    #: none.  With T of that time and a delay d a response has the factor exp(-s (d - T/2)) (1 -
+    #: exp(-s T))/(s T), of phase -omega d: exact below the frequencies that readings fold.
     holds: tuple[float, ...]
+    #: Disturbances that are the time derivative of another one, {"rate": "of"}: their column times
+    #: s is added to that of the other one in every response.
     rates: Mapping[str, str]
-    units: Mapping[str, str]
-    static: Mapping[str, float]
+    units: Mapping[str, str]  #: Unit of a signal by name, for reports.
+    static: Mapping[str, float]  #: Value of a signal at the operating point by name, in its unit.
+    #: How far a loss that switches with the direction of motion carries a signal to either side of
+    #: that value, by name, in its unit; nothing for others.
     loss: Mapping[str, float]
 
     def __init__(

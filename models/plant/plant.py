@@ -52,32 +52,17 @@ _QUIET = {"error_on_fail": False, "show_eval_warnings": False}  # we look at the
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OperatingPoint:
-    """The plant at rest.
+    """The plant at rest."""
 
-    Parameters
-    ----------
-    x, u, p
-        State, input and parameters, (nx,), (1,), (np,); the disturbances are zero.
-    command
-        Drive command that holds the load [V, rad/s or N m].
-    torque
-        Motor torque [N m].
-    tension
-        Rope tension at its upper end, below the sheaves [N].
-    outputs
-        Every performance output by name.
-    residual
-        Largest derivative that is left, over the terms that cancel in it [-].
-    """
-
+    #: State, input and parameters, (nx,), (1,), (np,); the disturbances are zero.
     x: FloatArray
     u: FloatArray
     p: FloatArray
-    command: float
-    torque: float
-    tension: float
-    outputs: Mapping[str, float]
-    residual: float
+    command: float  #: Drive command that holds the load [V, rad/s or N m].
+    torque: float  #: Motor torque [N m].
+    tension: float  #: Rope tension at its upper end, below the sheaves [N].
+    outputs: Mapping[str, float]  #: Every performance output by name.
+    residual: float  #: Largest derivative that is left, over the terms that cancel in it [-].
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

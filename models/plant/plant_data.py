@@ -41,106 +41,76 @@ _ITERATIONS = 4  # each wins the damping ratio's power: 1e-10 for one per cent
 class PlantData:
     """Numbers of rope, payload, winch and sensors, in SI units.
 
-    Parameters
-    ----------
-    axial_stiffness, rope_length, mass_per_length
-        EA [N], its real part at the first axial mode, length paid out [m], mass per length
-        [kg/m]; with falls of all of them together.
-    rope_weight
-        Submerged weight of the rope per length [N/m].
-    falls
-        Parallel parts of rope: the tension at the drum is that of one of them [-].
-    sheaves_efficiency
-        Tension behind the sheaves over that before them where the rope runs [-].
-    damping_ratio
-        Fraction of critical damping of the first axial mode [-].
-    damping_law
-        ``kelvin-voigt``: the fraction rises with a mode's frequency; ``hysteretic``: all modes
-        have the same, see `zener_branches`.
-    tip_stiffness
-        Of the crane's tip, in series with the rope's upper end [N/m]; infinite: rigid.
-    sling_stiffness, block_mass, block_weight
-        Of the slings below the rope [N/m], infinite: rigid; mass [kg] and submerged weight [N] of
-        the hook block between the two.
-    masses
-        Masses along the rope, the payload's included, 1 to 40; None: chosen for 40 rad/s.
-    lumping
-        ``distributed`` or ``thesis``, see `lump_rope`.
-    payload_mass, payload_weight
-        Mass with added mass [kg], submerged weight [N].
-    quadratic_drag
-        q = 1/2 rho C_D A of the drag force q v|v| [N s2/m2], the rope's share of it included
-        (`skin_drag_share`), as a linear plant has it.
-    skin_drag
-        1/2 rho C_t pi d of the drag along the rope, per length, of all falls [N s2/m3].
-    drum_radius, gear_ratio, gear_efficiency
-        r, what the load moves with a radian of the drum [m] (with one fall the radius to the
-        rope's centre, else that over the falls), n motor over drum [-], eta in (0, 1] [-].
-    inertia, viscous_friction
-        I [kg m2] and B [N m s/rad], everything referred to the motor shaft.
-    coulomb_friction, friction_speed
-        Dry friction T_c [N m] at the motor shaft, T_c tanh(speed / friction_speed [rad/s]).  In a
-        linear plant it is part of `LinearPlant.loss` alone.
-    switching
-        Whether the losses switch with the direction in what a linear plant says of rest; else it is
-        hauling, without dry friction.
-    motor
-        ``dc``: command is the armature voltage.  ``ac``: command is the speed reference
-        [rad/s] if `speed_gain` is above zero, else the torque demand [N m].
-    resistance, torque_constant, back_emf_constant, inductance
-        DC motor: R [ohm], K_T [N m/A], K_omega [V s/rad], L [H].  The torque constant of an
-        AC motor is one: its current is its torque.
-    torque_bandwidth, speed_gain
-        AC motor: bandwidth of the torque loop [rad/s], inf for none; gain of the drive's
-        speed regulator [N m s/rad].
-    sensor_bandwidth, telemetry_bandwidth
-        Second-order Butterworth low-passes on the payload's signals [rad/s], inf for none.
-    delay
-        Delay of the payload's signals [s].
-    command_delay
-        Delay from the command to the drive [s], which a linear plant has in its measurements.
-
     Notes
     -----
     Nothing is checked here: the numbers come from a case (`from_case`), which has checked them.
     """
 
+    #: EA [N], its real part at the first axial mode, length paid out [m], mass per length [kg/m];
+    #: with falls of all of them together.
     axial_stiffness: float
     rope_length: float
     mass_per_length: float
-    rope_weight: float = 0.0
+    rope_weight: float = 0.0  #: Submerged weight of the rope per length [N/m].
+    #: Parallel parts of rope: the tension at the drum is that of one of them [-].
     falls: float = 1.0
+    #: Tension behind the sheaves over that before them where the rope runs [-].
     sheaves_efficiency: float = 1.0
-    damping_ratio: float = 0.002
+    damping_ratio: float = 0.002  #: Fraction of critical damping of the first axial mode [-].
+    #: ``kelvin-voigt``: the fraction rises with a mode's frequency; ``hysteretic``: all modes have
+    #: the same, see `zener_branches`.
     damping_law: str = "kelvin-voigt"
+    #: Masses along the rope, the payload's included, 1 to 40; None: chosen for 40 rad/s.
     masses: int | None = None
-    lumping: str = "distributed"
+    lumping: str = "distributed"  #: ``distributed`` or ``thesis``, see `lump_rope`.
+    #: Of the crane's tip, in series with the rope's upper end [N/m]; infinite: rigid.
     tip_stiffness: float = math.inf
+    #: Of the slings below the rope [N/m], infinite: rigid; mass [kg] and submerged weight [N] of
+    #: the hook block between the two.
     sling_stiffness: float = math.inf
     block_mass: float = 0.0
     block_weight: float = 0.0
+    #: Mass with added mass [kg], submerged weight [N].
     payload_mass: float
     payload_weight: float
+    #: q = 1/2 rho C_D A of the drag force q v|v| [N s2/m2], the rope's share of it included
+    #: (`skin_drag_share`), as a linear plant has it.
     quadratic_drag: float = 0.0
+    #: 1/2 rho C_t pi d of the drag along the rope, per length, of all falls [N s2/m3].
     skin_drag: float = 0.0
+    #: r, what the load moves with a radian of the drum [m] (with one fall the radius to the rope's
+    #: centre, else that over the falls), n motor over drum [-], eta in (0, 1] [-].
     drum_radius: float
     gear_ratio: float
     gear_efficiency: float = 1.0
+    #: I [kg m2] and B [N m s/rad], everything referred to the motor shaft.
     inertia: float
     viscous_friction: float = 0.0
+    #: Dry friction T_c [N m] at the motor shaft, T_c tanh(speed / friction_speed [rad/s]).  In a
+    #: linear plant it is part of `LinearPlant.loss` alone.
     coulomb_friction: float = 0.0
     friction_speed: float = 1.0
+    #: Whether the losses switch with the direction in what a linear plant says of rest; else it is
+    #: hauling, without dry friction.
     switching: bool = True
+    #: ``dc``: command is the armature voltage.  ``ac``: command is the speed reference [rad/s] if
+    #: `speed_gain` is above zero, else the torque demand [N m].
     motor: str = "dc"
+    #: DC motor: R [ohm], K_T [N m/A], K_omega [V s/rad], L [H].  The torque constant of an AC motor
+    #: is one: its current is its torque.
     resistance: float = math.nan
     torque_constant: float = 1.0
     back_emf_constant: float = 0.0
     inductance: float = 0.0
+    #: AC motor: bandwidth of the torque loop [rad/s], inf for none; gain of the drive's speed
+    #: regulator [N m s/rad].
     torque_bandwidth: float = math.inf
     speed_gain: float = 0.0
+    #: Second-order Butterworth low-passes on the payload's signals [rad/s], inf for none.
     sensor_bandwidth: float = math.inf
     telemetry_bandwidth: float = math.inf
-    delay: float = 0.0
+    delay: float = 0.0  #: Delay of the payload's signals [s].
+    #: Delay from the command to the drive [s], which a linear plant has in its measurements.
     command_delay: float = 0.0
 
     @property

@@ -20,23 +20,16 @@ class PlantResponse:
 
     ``z = zw w + zu u`` and ``y = yw w + yu u``; with u = C y the closed loop is
     ``zw + zu C (I - yu C)^-1 yw``.
-
-    Parameters
-    ----------
-    s
-        The points in the complex plane [1/s], (k,).
-    zw, zu, yw, yu
-        Blocks, (k, nz, nw), (k, nz, nu), (k, ny, nw), (k, ny, nu), complex.  Disturbances
-        that are the rate of another one are folded into it, so nw counts independent ones.
-    inputs, disturbances, measurements, outputs
-        Names along the axes.
     """
 
-    s: ComplexArray
+    s: ComplexArray  #: The points in the complex plane [1/s], (k,).
+    #: Blocks, (k, nz, nw), (k, nz, nu), (k, ny, nw), (k, ny, nu), complex.  Disturbances that are
+    #: the rate of another one are folded into it, so nw counts independent ones.
     zw: ComplexArray
     zu: ComplexArray
     yw: ComplexArray
     yu: ComplexArray
+    #: Names along the axes.
     inputs: tuple[str, ...]
     disturbances: tuple[str, ...]
     measurements: tuple[str, ...]

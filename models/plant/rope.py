@@ -92,28 +92,15 @@ class Link:
     """A spring of the chain from the vessel to the payload, and the mass below it.
 
     Its numbers are floats or symbols, as were those that it was made of.
-
-    Parameters
-    ----------
-    stiffness
-        k of the rope in it, or of the slings [N/m].
-    give
-        k over the stiffness of what stands in series with it, the crane's tip [-]; 0 without.
-    damping_time
-        Kelvin-Voigt time tau of k [s].
-    is_rope
-        Whether it is rope.
-    carried
-        Weight below its top, its tension at rest [N].
-    mass, weight
-        Of rope and hook block in the mass below it [kg], [N]; the payload's own are not in them.
     """
 
-    stiffness: Any
+    stiffness: Any  #: k of the rope in it, or of the slings [N/m].
+    #: k over the stiffness of what stands in series with it, the crane's tip [-]; 0 without.
     give: Any
-    damping_time: Any
-    is_rope: bool
-    carried: Any
+    damping_time: Any  #: Kelvin-Voigt time tau of k [s].
+    is_rope: bool  #: Whether it is rope.
+    carried: Any  #: Weight below its top, its tension at rest [N].
+    #: Of rope and hook block in the mass below it [kg], [N]; the payload's own are not in them.
     mass: Any
     weight: Any
 

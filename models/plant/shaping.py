@@ -34,22 +34,15 @@ _LEAST_DAMPING, _MOST_DAMPING = 0.01, 3.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShapingFilter(ReadOnlyArrays):
-    """x' = A x + B n, signal C x, its derivative C A x; n is white noise of intensity one.
+    """x' = A x + B n, signal C x, its derivative C A x; n is white noise of intensity one."""
 
-    Attributes
-    ----------
-    A, B, C
-        State matrices, (n, n), (n, 1), (1, n).
-    variance_error
-        Variance of the fitted spectrum over that of the given one, minus one, in the band.
-    shape_error
-        Integral of the difference's modulus over the given variance (an L1 measure).
-    """
-
+    #: State matrices, (n, n), (n, 1), (1, n).
     A: FloatArray
     B: FloatArray
     C: FloatArray
+    #: Variance of the fitted spectrum over that of the given one, minus one, in the band.
     variance_error: float
+    #: Integral of the difference's modulus over the given variance (an L1 measure).
     shape_error: float
 
     @property

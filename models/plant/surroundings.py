@@ -100,35 +100,21 @@ class Deck(Ground):
 
 @dataclass(frozen=True, kw_only=True)
 class SplashZone:
-    """The water's surface, and the payload as a prism that crosses it.
-
-    Attributes
-    ----------
-    below
-        Height of the payload's underside above still water at the start [m]; negative where it
-        starts in the water, -`height` where it starts just submerged.
-    height
-        Height of the prism [m].
-    buoyancy
-        Weight in air less submerged weight [N].
-    added_mass
-        Added mass A33 when submerged [kg], as it is in the plant's virtual mass.
-    slamming_area, slamming_coefficient
-        A [m2] and C_s [-] of the slamming force: how fast the added mass grows.
-    water_density
-        rho [kg/m3].
-    wave_number
-        k of the decay with depth [1/m]; 0: the water at depth moves like the surface.
-    """
+    """The water's surface, and the payload as a prism that crosses it."""
 
     name: ClassVar[str] = "water"
+    #: Height of the payload's underside above still water at the start [m]; negative where it
+    #: starts in the water, -`height` where it starts just submerged.
     below: float
-    height: float
-    buoyancy: float
+    height: float  #: Height of the prism [m].
+    buoyancy: float  #: Weight in air less submerged weight [N].
+    #: Added mass A33 when submerged [kg], as it is in the plant's virtual mass.
     added_mass: float = 0.0
+    #: A [m2] and C_s [-] of the slamming force: how fast the added mass grows.
     slamming_area: float = 0.0
     slamming_coefficient: float = 5.0
-    water_density: float = SEA_WATER_DENSITY
+    water_density: float = SEA_WATER_DENSITY  #: rho [kg/m3].
+    #: k of the decay with depth [1/m]; 0: the water at depth moves like the surface.
     wave_number: float = 0.0
 
     def __post_init__(self) -> None:
@@ -148,26 +134,13 @@ class SplashZone:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurroundingForces:
-    """What the surroundings do to the payload, as expressions for the plant's equations.
+    """What the surroundings do to the payload, as expressions for the plant's equations."""
 
-    Attributes
-    ----------
-    force
-        Added to the forces on the payload, up positive [N].
-    virtual_mass_change
-        Added to the payload's virtual mass [kg].
-    drag_factor
-        Multiplies the plant's own drag [-].
-    relative_velocity
-        The velocity that this drag acts on [m/s].
-    outputs
-        Signals by name, in the order of :attr:`Surroundings.output_units`.
-    """
-
-    force: ca.SX
-    virtual_mass_change: ca.SX
-    drag_factor: ca.SX
-    relative_velocity: ca.SX
+    force: ca.SX  #: Added to the forces on the payload, up positive [N].
+    virtual_mass_change: ca.SX  #: Added to the payload's virtual mass [kg].
+    drag_factor: ca.SX  #: Multiplies the plant's own drag [-].
+    relative_velocity: ca.SX  #: The velocity that this drag acts on [m/s].
+    #: Signals by name, in the order of :attr:`Surroundings.output_units`.
     outputs: Mapping[str, ca.SX]
 
 

@@ -34,36 +34,21 @@ FEWEST_MAXIMA = 8
 
 @dataclass(frozen=True, kw_only=True)
 class ExtremeEstimate:
-    """A most probable maximum (or minimum) with its interval, in the signal's unit u.
+    """A most probable maximum (or minimum) with its interval, in the signal's unit u."""
 
-    Attributes
-    ----------
-    duration
-        The time T in which it is the most probable one [s].
-    value, low, high
-        The estimate and the ends of its interval [u]; NaN if there are too few data.
-    confidence
-        Of the interval, such as 0.95.
-    scale
-        Scale of the law of the maximum in T [u], whose location is `value`; that of a minimum is
-        negative.
-    count
-        Number of maxima that it rests on.
-    rayleigh
-        What a Gaussian signal of the same deviation and period would have [u]; NaN if not asked.
-    status
-        "ok", or the sentence that says why there is no estimate.
-    """
-
-    duration: float
+    duration: float  #: The time T in which it is the most probable one [s].
+    #: The estimate and the ends of its interval [u]; NaN if there are too few data.
     value: float
     low: float
     high: float
-    confidence: float
+    confidence: float  #: Of the interval, such as 0.95.
+    #: Scale of the law of the maximum in T [u], whose location is `value`; that of a minimum is
+    #: negative.
     scale: float
-    count: int
+    count: int  #: Number of maxima that it rests on.
+    #: What a Gaussian signal of the same deviation and period would have [u]; NaN if not asked.
     rayleigh: float = math.nan
-    status: str = "ok"
+    status: str = "ok"  #: "ok", or the sentence that says why there is no estimate.
 
 
 def gumbel_maximum(

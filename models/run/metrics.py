@@ -31,27 +31,15 @@ from .summary import Statistics
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Summary:
-    """What several seeds say together.
+    """What several seeds say together."""
 
-    Attributes
-    ----------
-    count
-        Number of runs.
-    confidence
-        Of every interval, such as 0.95.
-    means
-        Mean and interval by the name of each row of :meth:`Statistics.table`.
-    shares
-        How often "lost lock", "slack", "touched", and "not completed" where runs were given.
-    fall_time
-        Time until lock is lost; None where nobody watched.
-    """
-
-    count: int
-    confidence: float
+    count: int  #: Number of runs.
+    confidence: float  #: Of every interval, such as 0.95.
+    #: Mean and interval by the name of each row of :meth:`Statistics.table`.
     means: Mapping[str, Interval]
+    #: How often "lost lock", "slack", "touched", and "not completed" where runs were given.
     shares: Mapping[str, Share]
-    fall_time: FallTime | None
+    fall_time: FallTime | None  #: Time until lock is lost; None where nobody watched.
 
     def __post_init__(self) -> None:
         """Make the mappings read-only."""

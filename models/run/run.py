@@ -30,21 +30,11 @@ _EVENTS_SHOWN = 6
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """Something that happened in a run.
+    """Something that happened in a run."""
 
-    Attributes
-    ----------
-    time
-        When [s].
-    kind
-        One word for programs, such as "slack" or "brake".
-    text
-        The sentence that a user reads.
-    """
-
-    time: float
-    kind: str
-    text: str
+    time: float  #: When [s].
+    kind: str  #: One word for programs, such as "slack" or "brake".
+    text: str  #: The sentence that a user reads.
 
     def __str__(self) -> str:
         """Return the time and the sentence."""
@@ -53,28 +43,16 @@ class Event:
 
 @dataclass(frozen=True, kw_only=True)
 class Timings:
-    """How fast a run was.
+    """How fast a run was."""
 
-    Attributes
-    ----------
-    wall_seconds
-        Time it took [s].
-    steps
-        Integration steps.
-    real_time_factor
-        Simulated time over wall time.
-    controller_median, controller_p99, controller_max
-        Wall time of one step of a controller in Python [s]; NaN for one compiled into the loop.
-    fallbacks
-        How often something had to be replaced (a late controller, a NaN), by its name.
-    """
-
-    wall_seconds: float
-    steps: int
-    real_time_factor: float
+    wall_seconds: float  #: Time it took [s].
+    steps: int  #: Integration steps.
+    real_time_factor: float  #: Simulated time over wall time.
+    #: Wall time of one step of a controller in Python [s]; NaN for one compiled into the loop.
     controller_median: float = math.nan
     controller_p99: float = math.nan
     controller_max: float = math.nan
+    #: How often something had to be replaced (a late controller, a NaN), by its name.
     fallbacks: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -98,32 +98,17 @@ class SignalStatistics:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Statistics:
-    """Statistics of a run from `settle` on.
+    """Statistics of a run from `settle` on."""
 
-    Attributes
-    ----------
-    sample_time
-        Time between samples [s].
-    settle
-        Samples before this time were not counted [s].
-    samples
-        Number of samples counted.
-    end
-        Time of the run's last sample [s].
-    signals
-        Statistics by signal; `payload.error` is the tracking error.
-    quantities
-        What they say about the operation, by name: ``statistics.value("payload rms")``.
-    block, blocks
-        Length of a block [s], and the extremes of chosen signals in each whole block.
-    """
-
-    sample_time: float
-    settle: float
-    samples: int
-    end: float
+    sample_time: float  #: Time between samples [s].
+    settle: float  #: Samples before this time were not counted [s].
+    samples: int  #: Number of samples counted.
+    end: float  #: Time of the run's last sample [s].
+    #: Statistics by signal; `payload.error` is the tracking error.
     signals: Mapping[str, SignalStatistics]
+    #: What they say about the operation, by name: ``statistics.value("payload rms")``.
     quantities: Mapping[str, NamedQuantity]
+    #: Length of a block [s], and the extremes of chosen signals in each whole block.
     block: float
     blocks: Mapping[str, Blocks]
 

@@ -37,56 +37,30 @@ class Rejection:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RawRecords:
-    """What a reader found, before quality control.
+    """What a reader found, before quality control."""
 
-    Attributes
-    ----------
-    file_format
-        Name of the format, for people.
-    time
-        Times, UTC (n,); NaT where the file has none.
-    frequency
-        Frequencies, strictly ascending (k,) [Hz].
-    density
-        Variance densities (n, k) [m^2/Hz], NaN where missing.
-    direction
-        Mean direction that the waves come from, clockwise from north (n,) [deg], or None.
-    place
-        Where each record is from (n,), or empty where there is one place only.
-    names
-        What to call each record in an account (n,), or empty to call it by its time.
-    rejections, notes
-        What the reader itself had to leave out, and what it noticed.
-    """
-
-    file_format: str
-    time: TimeArray
-    frequency: FloatArray
-    density: FloatArray
+    file_format: str  #: Name of the format, for people.
+    time: TimeArray  #: Times, UTC (n,); NaT where the file has none.
+    frequency: FloatArray  #: Frequencies, strictly ascending (k,) [Hz].
+    density: FloatArray  #: Variance densities (n, k) [m^2/Hz], NaN where missing.
+    #: Mean direction that the waves come from, clockwise from north (n,) [deg], or None.
     direction: FloatArray | None = None
+    #: Where each record is from (n,), or empty where there is one place only.
     place: tuple[str, ...] = ()
+    #: What to call each record in an account (n,), or empty to call it by its time.
     names: tuple[str, ...] = ()
+    #: What the reader itself had to leave out, and what it noticed.
     rejections: tuple[Rejection, ...] = ()
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class QualityControl:
-    """What became of the records of a file.
+    """What became of the records of a file."""
 
-    Attributes
-    ----------
-    read
-        How many records the file holds.
-    rejections
-        What was rejected, in the order of the checks.
-    notes
-        What else was found and put right.
-    """
-
-    read: int
-    rejections: tuple[Rejection, ...] = ()
-    notes: tuple[str, ...] = ()
+    read: int  #: How many records the file holds.
+    rejections: tuple[Rejection, ...] = ()  #: What was rejected, in the order of the checks.
+    notes: tuple[str, ...] = ()  #: What else was found and put right.
 
     @property
     def rejected(self) -> int:

@@ -41,26 +41,6 @@ _EXTENSIONS = {".spt": "datawell", ".oct": "octopus", ".mat": "xwaves"}
 class SeaRecords:
     """The sea states of a file, in the order of time.
 
-    Attributes
-    ----------
-    time
-        Times, UTC (n,); NaT where the file has none.
-    omega
-        Frequencies, strictly ascending (k,) [rad/s].
-    density
-        Variance densities (n, k) [m^2 s/rad].
-    direction
-        Mean direction that the waves come from, clockwise from north (n,) [rad], NaN where it is
-        unknown; None where the file has no directions.
-    place
-        Where each record is from (n,), or empty where there is one place only.
-    quality
-        The account of what was read and rejected.
-    source
-        The file.
-    file_format
-        Its format, for people.
-
     Examples
     --------
     >>> records = SeaRecords.from_arrays([0.05, 0.1, 0.2, 0.3], [[0.0, 5.0, 1.0, 0.2]])
@@ -70,14 +50,17 @@ class SeaRecords:
     2.79
     """
 
-    time: TimeArray
-    omega: FloatArray
-    density: FloatArray
+    time: TimeArray  #: Times, UTC (n,); NaT where the file has none.
+    omega: FloatArray  #: Frequencies, strictly ascending (k,) [rad/s].
+    density: FloatArray  #: Variance densities (n, k) [m^2 s/rad].
+    #: Mean direction that the waves come from, clockwise from north (n,) [rad], NaN where it is
+    #: unknown; None where the file has no directions.
     direction: FloatArray | None
+    #: Where each record is from (n,), or empty where there is one place only.
     place: tuple[str, ...]
-    quality: QualityControl
-    source: str
-    file_format: str
+    quality: QualityControl  #: The account of what was read and rejected.
+    source: str  #: The file.
+    file_format: str  #: Its format, for people.
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""

@@ -21,25 +21,6 @@ from ..basics import FloatArray, InputError, check_finite, check_range
 class Scatter:
     """Sea states and how often each occurs.
 
-    Attributes
-    ----------
-    significant_height
-        H_s (n,), n >= 1 [m].
-    peak_period
-        T_p (n,) [s].
-    occurrence
-        Share of the time (n,) [-]; given as shares, per cent or counts, kept so that they add up
-        to one.
-    month
-        Month of each state, 1 to 12 (n,), or None where the diagram is for the whole year.
-    heading
-        Direction that the waves travel towards, counter-clockwise from the bow (or, of a site,
-        from the axis that its file says) (n,) [rad], or None.
-    source
-        Where the diagram comes from.
-    total
-        What the occurrences added up to when they were given: the number of records, or 100.
-
     Raises
     ------
     InputError
@@ -54,12 +35,18 @@ class Scatter:
     0.75
     """
 
-    significant_height: FloatArray
-    peak_period: FloatArray
+    significant_height: FloatArray  #: H_s (n,), n >= 1 [m].
+    peak_period: FloatArray  #: T_p (n,) [s].
+    #: Share of the time (n,) [-]; given as shares, per cent or counts, kept so that they add up to
+    #: one.
     occurrence: FloatArray
+    #: Month of each state, 1 to 12 (n,), or None where the diagram is for the whole year.
     month: npt.NDArray[Any] | None = None
+    #: Direction that the waves travel towards, counter-clockwise from the bow (or, of a site, from
+    #: the axis that its file says) (n,) [rad], or None.
     heading: FloatArray | None = None
-    source: str = "scatter diagram"
+    source: str = "scatter diagram"  #: Where the diagram comes from.
+    #: What the occurrences added up to when they were given: the number of records, or 100.
     total: float = math.nan
 
     def __post_init__(self) -> None:

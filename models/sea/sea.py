@@ -80,30 +80,6 @@ _GAUSSIAN_END = 12.0  # standard deviations: exp(-72)
 class SeaSpectrum:
     """A sea state by its spectrum.
 
-    Attributes
-    ----------
-    kind
-        One of :data:`SPECTRA`.
-    significant_height
-        H_s [m]; of `measured` and `sum` what their data have, unless given to scale them.
-    peak_period
-        T_p [s]; for the standard forms but `bretschneider-1975` and `pierson-moskowitz`.
-    significant_period
-        T_S, the mean period of the highest third of the waves [s]; for `bretschneider-1975` only.
-    gamma
-        Peak enhancement of `jonswap` and `tma` [-], 1 to 7: beyond, its normalisation is 1 % off.
-    order
-        The shape parameter q of `ochi-hubble` [-]; 1 gives `bretschneider`.
-    depth, width
-        Water depth of `tma` [m]; standard deviation of `gaussian-swell`'s frequency [rad/s].
-    table, parts
-        The rows of `measured`; the seas of `sum`, none a sum itself.
-    shape_height
-        H_s that the shape of `pierson-moskowitz` and `torsethaugen` is taken at [m]; its own if
-        left out.  `scaled` sets it.
-    spreading
-        How the energy divides over headings, for the vessel's response; None if long-crested.
-
     Raises
     ------
     InputError
@@ -117,17 +93,26 @@ class SeaSpectrum:
     (2.0, 7.1)
     """
 
-    kind: str
+    kind: str  #: One of :data:`SPECTRA`.
+    #: H_s [m]; of `measured` and `sum` what their data have, unless given to scale them.
     significant_height: float = math.nan
+    #: T_p [s]; for the standard forms but `bretschneider-1975` and `pierson-moskowitz`.
     peak_period: float | None = None
+    #: T_S, the mean period of the highest third of the waves [s]; for `bretschneider-1975` only.
     significant_period: float | None = None
+    #: Peak enhancement of `jonswap` and `tma` [-], 1 to 7: beyond, its normalisation is 1 % off.
     gamma: float = 3.3
-    order: float = 2.0
+    order: float = 2.0  #: The shape parameter q of `ochi-hubble` [-]; 1 gives `bretschneider`.
+    #: Water depth of `tma` [m]; standard deviation of `gaussian-swell`'s frequency [rad/s].
     depth: float | None = None
     width: float | None = None
+    #: The rows of `measured`; the seas of `sum`, none a sum itself.
     table: SpectrumTable | None = None
     parts: tuple[SeaSpectrum, ...] | None = None
+    #: H_s that the shape of `pierson-moskowitz` and `torsethaugen` is taken at [m]; its own if left
+    #: out.  `scaled` sets it.
     shape_height: float | None = None
+    #: How the energy divides over headings, for the vessel's response; None if long-crested.
     spreading: Spreading | None = None
 
     def __post_init__(self) -> None:

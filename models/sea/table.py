@@ -30,15 +30,6 @@ _TAIL_END = 60.0
 class SpectrumTable:
     """Variance densities at frequencies.
 
-    Attributes
-    ----------
-    omega
-        Frequencies, strictly ascending from zero or above (k,), 3 to 1000 of them [rad/s].
-    density
-        S at each (k,), at least zero [m^2 s/rad].
-    beyond
-        One of :data:`BEYOND`.
-
     Raises
     ------
     InputError
@@ -51,9 +42,10 @@ class SpectrumTable:
     0.2
     """
 
+    #: Frequencies, strictly ascending from zero or above (k,), 3 to 1000 of them [rad/s].
     omega: tuple[float, ...]
-    density: tuple[float, ...]
-    beyond: str = "decay"
+    density: tuple[float, ...]  #: S at each (k,), at least zero [m^2 s/rad].
+    beyond: str = "decay"  #: One of :data:`BEYOND`.
 
     def __post_init__(self) -> None:
         """Check the table and hold it as tuples of floats."""

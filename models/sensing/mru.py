@@ -65,42 +65,21 @@ class MruBlock(ReadOnlyArrays):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MruState:
-    """What one chunk hands to the next; `MruModel.initial` makes the first.
+    """What one chunk hands to the next; `MruModel.initial` makes the first."""
 
-    Parameters
-    ----------
-    sample
-        Number of the next sample.
-    last
-        Displacement and velocity at the sample before [m], [m/s], (2,).
-    filter, errors
-        Modes of the high-pass and of the errors, complex.
-    past
-        Earlier heave and heave rate, oldest first, that are still on their way (lag, 2).
-    held
-        Heave and heave rate shown last (2,).
-    """
-
-    sample: int
-    last: FloatArray
+    sample: int  #: Number of the next sample.
+    last: FloatArray  #: Displacement and velocity at the sample before [m], [m/s], (2,).
+    #: Modes of the high-pass and of the errors, complex.
     filter: complex
     errors: tuple[complex, ...]
+    #: Earlier heave and heave rate, oldest first, that are still on their way (lag, 2).
     past: FloatArray
-    held: FloatArray
+    held: FloatArray  #: Heave and heave rate shown last (2,).
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorProcess:
     """One error of the heave: white noise behind a second-order Butterworth low-pass.
-
-    Attributes
-    ----------
-    rms
-        Standard deviation [m].
-    corner
-        Corner frequency of the low-pass [rad/s].
-    purpose
-        Its table of draws.
 
     Notes
     -----
@@ -109,9 +88,9 @@ class ErrorProcess:
     over a sample, the difference of the heave's errors.
     """
 
-    rms: float
-    corner: float
-    purpose: int
+    rms: float  #: Standard deviation [m].
+    corner: float  #: Corner frequency of the low-pass [rad/s].
+    purpose: int  #: Its table of draws.
 
     @property
     def white(self) -> bool:
@@ -159,24 +138,6 @@ class ErrorProcess:
 class MruModel:
     """A motion reference unit; sample k is at k `sample_time`.
 
-    Parameters
-    ----------
-    mru
-        Its data; None for a perfect unit, which shows the hook's motion as it is.
-    sample_time
-        Time between samples [s].
-    heave_rms
-        Standard deviation of the hook's heave [m], which the relative error is of.
-    seed
-        Seed of the run.
-    outages
-        Intervals (start, end) [s] in which the unit is gone; it shows its last values, not valid.
-    biases
-        (start, end, heave, rate): what it shows too much in an interval [s], [m], [m/s].
-    heave_frequency
-        Mean frequency of the hook's heave [rad/s], such as rms velocity over rms displacement;
-        None if it is not known.
-
     Notes
     -----
     High-pass: second-order Butterworth, s^2/(s^2 + sqrt(2) w s + w^2) with w = 2 pi over the
@@ -200,12 +161,16 @@ class MruModel:
     period.
     """
 
-    mru: MRU | None
-    sample_time: float
-    heave_rms: float
-    seed: int
+    mru: MRU | None  #: Its data; None for a perfect unit, which shows the hook's motion as it is.
+    sample_time: float  #: Time between samples [s].
+    heave_rms: float  #: Standard deviation of the hook's heave [m], which the relative error is of.
+    seed: int  #: Seed of the run.
+    #: Intervals (start, end) [s] in which the unit is gone; it shows its last values, not valid.
     outages: Sequence[Interval] = ()
+    #: Mean frequency of the hook's heave [rad/s], such as rms velocity over rms displacement; None
+    #: if it is not known.
     heave_frequency: float | None = None
+    #: (start, end, heave, rate): what it shows too much in an interval [s], [m], [m/s].
     biases: Sequence[Bias] = ()
 
     @property

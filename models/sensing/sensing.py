@@ -57,23 +57,6 @@ _SPEED_WINDOW = 0.01  # time over which a drive counts pulses for the speed [s]
 class SensorModel:
     """Sensors and telemetry of a case at one sample time.
 
-    Parameters
-    ----------
-    sample_time
-        Time between control samples [s].
-    payload
-        Motion sensors at the payload.
-    filters
-        What the noise of payload signals passes, by the signal's name; white noise has none.
-    lags
-        Ages in samples that a message may have when it is used (`TelemetrySchedule.lags`).
-    encoder, load_cell
-        None for perfect ones.
-    haul_per_angle
-        Haul of the drum per angle of the motor [m/rad].
-    static_tension
-        Rope tension at the drum at rest [N], which the load cell's noise is a fraction of.
-
     Notes
     -----
     Payload: the signal of a latency before is interpolated between samples; bias and noise are
@@ -93,13 +76,17 @@ class SensorModel:
     independent noise at every sample.
     """
 
-    sample_time: float
-    payload: PayloadSensor
+    sample_time: float  #: Time between control samples [s].
+    payload: PayloadSensor  #: Motion sensors at the payload.
+    #: What the noise of payload signals passes, by the signal's name; white noise has none.
     filters: Mapping[str, ShapingFilter] = field(default_factory=dict)
+    #: Ages in samples that a message may have when it is used (`TelemetrySchedule.lags`).
     lags: range
+    #: None for perfect ones.
     encoder: Encoder | None
     load_cell: LoadCell | None
-    haul_per_angle: float
+    haul_per_angle: float  #: Haul of the drum per angle of the motor [m/rad].
+    #: Rope tension at the drum at rest [N], which the load cell's noise is a fraction of.
     static_tension: float
 
     @classmethod

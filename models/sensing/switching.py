@@ -124,23 +124,12 @@ def _omega() -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SwitchingNoise:
-    """The remnant as noise on the drive's command, in the command's unit u.
+    """The remnant as noise on the drive's command, in the command's unit u."""
 
-    Attributes
-    ----------
-    torque
-        Loss Delta to either side of its mean [N m].
-    hook
-        Motion of the hook.
-    per_heave
-        Motor's speed over the hook's [rad/m].
-    gain, lag
-        Torque per command [N m/u] of a motor that stands, and its lag [s].
-    """
-
-    torque: float
-    hook: HookMotion
-    per_heave: float
+    torque: float  #: Loss Delta to either side of its mean [N m].
+    hook: HookMotion  #: Motion of the hook.
+    per_heave: float  #: Motor's speed over the hook's [rad/m].
+    #: Torque per command [N m/u] of a motor that stands, and its lag [s].
     gain: float
     lag: float
 

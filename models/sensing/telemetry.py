@@ -38,42 +38,19 @@ _ROUNDING = 1e-6  # of a sample: 0.07 s is seven samples of 0.01 s, whatever the
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TelemetryBlock(ReadOnlyArrays):
-    """What arrives in a stretch of samples.
+    """What arrives in a stretch of samples."""
 
-    Parameters
-    ----------
-    weights
-        Weights of the messages sent `lags` samples ago (count, len(lags)): at most two are not
-        zero, and they add up to 1 where something has arrived, else to 0.
-    fresh
-        1 where something new and usable has arrived since the sample before, else 0 (count,).
-    age
-        Time since what is known last was true [s], (count,).
-    """
-
+    #: Weights of the messages sent `lags` samples ago (count, len(lags)): at most two are not zero,
+    #: and they add up to 1 where something has arrived, else to 0.
     weights: FloatArray
+    #: 1 where something new and usable has arrived since the sample before, else 0 (count,).
     fresh: FloatArray
-    age: FloatArray
+    age: FloatArray  #: Time since what is known last was true [s], (count,).
 
 
 @dataclass(frozen=True, eq=False)
 class TelemetrySchedule:
     """The schedule of a link; sample k is at k `sample_time`.
-
-    Parameters
-    ----------
-    telemetry
-        Delay, jitter and dropouts.
-    sample_time
-        Time between control samples, and between messages [s].
-    seed
-        Seed of the run.
-    outages
-        Intervals (start, end) [s] in which nothing is sent.
-    broken
-        Intervals in which the messages come, but are marked as invalid.
-    late
-        (start, end, extra) [s]: messages sent in the interval are late by so much more.
 
     Notes
     -----
@@ -93,11 +70,13 @@ class TelemetrySchedule:
     ([2, 3], [0.5, 0.5])
     """
 
-    telemetry: Telemetry
-    sample_time: float
-    seed: int
-    outages: Sequence[Interval] = ()
+    telemetry: Telemetry  #: Delay, jitter and dropouts.
+    sample_time: float  #: Time between control samples, and between messages [s].
+    seed: int  #: Seed of the run.
+    outages: Sequence[Interval] = ()  #: Intervals (start, end) [s] in which nothing is sent.
+    #: Intervals in which the messages come, but are marked as invalid.
     broken: Sequence[Interval] = ()
+    #: (start, end, extra) [s]: messages sent in the interval are late by so much more.
     late: Sequence[Late] = ()
 
     @cached_property

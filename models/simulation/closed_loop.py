@@ -61,39 +61,22 @@ _UNITS = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopRecursion:
-    """The recursion of a closed loop and the names of all that goes through it.
+    """The recursion of a closed loop and the names of all that goes through it."""
 
-    Parameters
-    ----------
-    functions
-        (s, r, p) -> (s', log), with the controller inside; or, for a controller in Python,
-        (s, r, p) -> (s', m) and (s, [r, u], p) -> (s', log), one after the other a sample.
-    states, signals
-        Names of s and the log.
-    motions
-        Names of what moves, the hook first; of each the row holds displacement, velocity and
-        acceleration at the ends of every integration step.
-    units
-        Unit of each signal of the log.
-    parameters
-        Names and values of p.
-    step
-        The integration step and what set it.
-    sample_time
-        The controller's [s].
-    initial
-        State at rest.
-    """
-
+    #: (s, r, p) -> (s', log), with the controller inside; or, for a controller in Python, (s, r, p)
+    #: -> (s', m) and (s, [r, u], p) -> (s', log), one after the other a sample.
     functions: tuple[ca.Function, ...]
+    #: Names of s and the log.
     states: tuple[str, ...]
     signals: tuple[str, ...]
+    #: Names of what moves, the hook first; of each the row holds displacement, velocity and
+    #: acceleration at the ends of every integration step.
     motions: tuple[str, ...]
-    units: Mapping[str, str]
-    parameters: Mapping[str, float]
-    step: StepChoice
-    sample_time: float
-    initial: FloatArray
+    units: Mapping[str, str]  #: Unit of each signal of the log.
+    parameters: Mapping[str, float]  #: Names and values of p.
+    step: StepChoice  #: The integration step and what set it.
+    sample_time: float  #: The controller's [s].
+    initial: FloatArray  #: State at rest.
 
 
 def build_closed_loop(

@@ -154,28 +154,15 @@ def _between(first: ca.SX, last: ca.SX, step: float) -> ca.SX:
 
 @dataclass(frozen=True, kw_only=True)
 class StepChoice:
-    """How a control sample is divided into integration steps.
+    """How a control sample is divided into integration steps."""
 
-    Parameters
-    ----------
-    sample_time
-        Control sample [s].
-    substeps
-        Steps to a sample.
-    step
-        Length of a step, sample_time / substeps [s].
-    largest
-        Longest step that is allowed, before it was made to divide the sample [s]; at most
-        the sample itself.
-    fastest
-        The mode that sets it [rad/s]; zero if nothing but the sample does.
-    """
-
-    sample_time: float
-    substeps: int
-    step: float
+    sample_time: float  #: Control sample [s].
+    substeps: int  #: Steps to a sample.
+    step: float  #: Length of a step, sample_time / substeps [s].
+    #: Longest step that is allowed, before it was made to divide the sample [s]; at most the sample
+    #: itself.
     largest: float
-    fastest: float
+    fastest: float  #: The mode that sets it [rad/s]; zero if nothing but the sample does.
 
 
 def choose_step(

@@ -25,33 +25,19 @@ FLAGS = ("engaged", "brake")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RowMaker:
-    """Makes the rows of one run.
+    """Makes the rows of one run."""
 
-    Parameters
-    ----------
-    motions
-        The hook's motion first, then whatever else moves, at the integration step.
-    substeps
-        Integration steps in a sample.
-    sensors, telemetry, mru, schedule
-        What belongs to the sensors, and what is asked of the run.
-    seed
-        Seed of the run.
-    closing_time
-        Time that the brake takes to close [s]; it opens at once.
-    always_braked
-        The brake stays closed, whatever the schedule says.
-    """
-
+    #: The hook's motion first, then whatever else moves, at the integration step.
     motions: tuple[Motion, ...]
-    substeps: int
+    substeps: int  #: Integration steps in a sample.
+    #: What belongs to the sensors, and what is asked of the run.
     sensors: SensorModel
     telemetry: TelemetrySchedule
     mru: MruModel
     schedule: Schedule
-    seed: int
-    closing_time: float
-    always_braked: bool = False
+    seed: int  #: Seed of the run.
+    closing_time: float  #: Time that the brake takes to close [s]; it opens at once.
+    always_braked: bool = False  #: The brake stays closed, whatever the schedule says.
 
     def start(self) -> MruState:
         """Return the state of the reference unit before the first row."""

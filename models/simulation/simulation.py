@@ -51,82 +51,50 @@ _GEAR_TURN = 1.0  # motor speed over which the gear's losses change sides [rad/s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulationOptions:
-    """How to simulate, and what to keep of it.
+    """How to simulate, and what to keep of it."""
 
-    Parameters
-    ----------
-    hook
-        Motion of the hook; by default drawn from the case's sea.
-    duration
-        Length of a run [s]; by default the scenario's own.
-    step
-        Integration step [s]; by default the longest that the plant's fastest mode allows.
-    masses
-        Masses along the rope; by default those of the case.
-    limits
-        Limits of the drive; by default those of the case, `DriveLimits()` for none.
-    parameters
-        Values of plant parameters by name, such as ``{"payload.quadratic_drag": 0.0}``.
-    settle
-        Time from which statistics count [s]; by default the scenario's own, or the 30 s in which
-        the hook's motion grows and ten peak periods of the sea; at most a tenth of the run, but
-        not before a controller that warms up is engaged.
-    store_step
-        Time between stored samples [s]; by default such that at most 40 000 are kept.
-    lock_limit
-        Size of the payload's error beyond which it counts as having lost lock [m]; by default
-        not watched.
-    deadline
-        Wall time that a controller in Python may take for a step [s]; a later command is not
-        used, the one before is held.
-    compiled
-        True: as C; False: in CasADi's virtual machine; None: as C if there is a compiler.
-    """
-
-    hook: MotionSource | None = None
-    duration: float | None = None
+    hook: MotionSource | None = None  #: Motion of the hook; by default drawn from the case's sea.
+    duration: float | None = None  #: Length of a run [s]; by default the scenario's own.
+    #: Integration step [s]; by default the longest that the plant's fastest mode allows.
     step: float | None = None
-    masses: int | None = None
+    masses: int | None = None  #: Masses along the rope; by default those of the case.
+    #: Limits of the drive; by default those of the case, `DriveLimits()` for none.
     limits: DriveLimits | None = None
+    #: Values of plant parameters by name, such as ``{"payload.quadratic_drag": 0.0}``.
     parameters: Mapping[str, float] | None = None
+    #: Time from which statistics count [s]; by default the scenario's own, or the 30 s in which the
+    #: hook's motion grows and ten peak periods of the sea; at most a tenth of the run, but not
+    #: before a controller that warms up is engaged.
     settle: float | None = None
+    #: Time between stored samples [s]; by default such that at most 40 000 are kept.
     store_step: float | None = None
+    #: Size of the payload's error beyond which it counts as having lost lock [m]; by default not
+    #: watched.
     lock_limit: float | None = None
+    #: Wall time that a controller in Python may take for a step [s]; a later command is not used,
+    #: the one before is held.
     deadline: float | None = None
+    #: True: as C; False: in CasADi's virtual machine; None: as C if there is a compiler.
     compiled: bool | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Simulation:
-    """A controller on a plant, ready to run; `prepare` makes it.
+    """A controller on a plant, ready to run; `prepare` makes it."""
 
-    Parameters
-    ----------
-    case, controller, scenario, options
-        What is simulated, and how.
-    hook
-        Where the hook's motion comes from.
-    loop
-        The recursion of one sample.
-    kernels
-        What runs it: one kernel with the controller inside, or two, of what comes before the
-        controller and of what comes after.
-    sensors
-        What the controller sees.
-    rest
-        The plant at rest.
-    """
-
+    #: What is simulated, and how.
     case: Case
     controller: Controller
     scenario: Scenario
     options: SimulationOptions
-    hook: MotionSource
-    loop: LoopRecursion
+    hook: MotionSource  #: Where the hook's motion comes from.
+    loop: LoopRecursion  #: The recursion of one sample.
+    #: What runs it: one kernel with the controller inside, or two, of what comes before the
+    #: controller and of what comes after.
     kernels: tuple[Kernel, ...]
-    sensors: SensorModel
+    sensors: SensorModel  #: What the controller sees.
     schedule: Schedule
-    rest: OperatingPoint
+    rest: OperatingPoint  #: The plant at rest.
 
     @property
     def fused(self) -> bool:

@@ -25,25 +25,14 @@ OVERSPEED = 1.15
 
 @dataclass(frozen=True, kw_only=True)
 class TripLimit:
-    """The range of a signal, and what to say when it is left.
+    """The range of a signal, and what to say when it is left."""
 
-    Parameters
-    ----------
-    signal
-        Name of the signal.
-    low, high
-        The range that is allowed.
-    kind
-        One word for the event.
-    text
-        The sentence; `{value}` is the signal's.
-    """
-
-    signal: str
+    signal: str  #: Name of the signal.
+    #: The range that is allowed.
     low: float = -math.inf
     high: float = math.inf
-    kind: str
-    text: str
+    kind: str  #: One word for the event.
+    text: str  #: The sentence; `{value}` is the signal's.
 
 
 def trip_limits(case: Case) -> tuple[TripLimit, ...]:

@@ -47,23 +47,12 @@ _DERIVED: Mapping[str, Callable[[Case], float]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """One number that may vary.
+    """One number that may vary."""
 
-    Attributes
-    ----------
-    path
-        Its dotted path, without aliases.
-    kind
-        A key of `models.basics.units.KINDS`.
-    nominal
-        Its value in the case or the design.
-    low, high
-        The range that the field allows.
-    """
-
-    path: str
-    kind: str
-    nominal: float
+    path: str  #: Its dotted path, without aliases.
+    kind: str  #: A key of `models.basics.units.KINDS`.
+    nominal: float  #: Its value in the case or the design.
+    #: The range that the field allows.
     low: float = -math.inf
     high: float = math.inf
 

@@ -42,20 +42,6 @@ Pairs = Mapping[tuple[str, str], float]
 class Spread:
     """What varies about a case.
 
-    Parameters
-    ----------
-    distributions
-        By dotted path of the case, by an alias (`stiffness`, `payload`, `delay`, ..), by
-        ``gains.`` and the name of a gain, or ``drag`` (the design's linear drag coefficient).
-        A text or a number alone is `Uniform` of that width about the case's own value.
-    correlations
-        Rank correlation (Spearman's) of pairs of paths, each in (-1, 1); the others are
-        independent.
-    fields
-        What the paths are on a case; `on` fills it in.
-    case
-        That case.
-
     Raises
     ------
     InputError
@@ -71,10 +57,14 @@ class Spread:
     ([33159.6, 0.0], [40528.4, 0.05])
     """
 
+    #: By dotted path of the case, by an alias (`stiffness`, `payload`, `delay`, ..), by ``gains.``
+    #: and the name of a gain, or ``drag`` (the design's linear drag coefficient). A text or a
+    #: number alone is `Uniform` of that width about the case's own value.
     distributions: Mapping[str, Any]
+    #: Rank correlation (Spearman's) of pairs of paths, each in (-1, 1); the others are independent.
     correlations: Pairs | None = None
-    fields: tuple[Field, ...] = ()
-    case: Case | None = None
+    fields: tuple[Field, ...] = ()  #: What the paths are on a case; `on` fills it in.
+    case: Case | None = None  #: That case.
 
     def __post_init__(self) -> None:
         if not self.distributions:

@@ -51,25 +51,6 @@ _LEAD = {"crest": 0.0, "trough": -math.pi, "zero up-crossing": 0.5 * math.pi,
 class Convention:
     """What the numbers of a RAO file mean; the defaults are the project's own convention.
 
-    Attributes
-    ----------
-    waves
-        What the first column of the table is.
-    phase, phase_unit, phase_relative_to
-        Of the phases: whether they lead or lag, in what unit, and relative to what of the wave.
-        Complex numbers with the time factor e^{-i omega t} are `lags`.
-    rotations
-        Unit of roll, pitch and yaw: per metre of wave amplitude, or over the wave's largest slope
-        k a, or over its steepness (height over length, k a/pi).
-    surge, sway, heave, roll, pitch, yaw
-        The positive direction of each motion.
-    headings
-        Whether a heading is where the waves travel towards, or where they come from.
-    turning
-        Which way headings grow, seen from above.
-    heading_zero
-        Where heading zero points, from the bow, counter-clockwise seen from above [deg].
-
     Raises
     ------
     InputError
@@ -83,19 +64,26 @@ class Convention:
     'sway starboard, heave down, pitch bow up, yaw bow to starboard, turning clockwise'
     """
 
-    waves: str = "frequency (rad/s)"
+    waves: str = "frequency (rad/s)"  #: What the first column of the table is.
+    #: Of the phases: whether they lead or lag, in what unit, and relative to what of the wave.
+    #: Complex numbers with the time factor e^{-i omega t} are `lags`.
     phase: str = "leads"
     phase_unit: str = "degrees"
     phase_relative_to: str = "crest"
+    #: Unit of roll, pitch and yaw: per metre of wave amplitude, or over the wave's largest slope k
+    #: a, or over its steepness (height over length, k a/pi).
     rotations: str = "rad/m"
+    #: The positive direction of each motion.
     surge: str = "forward"
     sway: str = "port"
     heave: str = "up"
     roll: str = "starboard down"
     pitch: str = "bow down"
     yaw: str = "bow to port"
+    #: Whether a heading is where the waves travel towards, or where they come from.
     headings: str = "towards"
-    turning: str = "counter-clockwise"
+    turning: str = "counter-clockwise"  #: Which way headings grow, seen from above.
+    #: Where heading zero points, from the bow, counter-clockwise seen from above [deg].
     heading_zero: float = 0.0
 
     def __post_init__(self) -> None:

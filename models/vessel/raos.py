@@ -54,29 +54,6 @@ _ANGLES = (3, 4, 5)
 class VesselRaos(ReadOnlyArrays):
     """Response amplitude operators (RAOs) of a vessel's six motions.
 
-    Attributes
-    ----------
-    name
-        What the vessel is called.
-    omega
-        Wave frequencies as felt by a vessel at rest, strictly ascending, above zero (k,) [rad/s].
-    heading
-        Where the waves travel towards, strictly ascending in [0, 2 pi) (h,) [rad].
-    values
-        Motion per wave amplitude (k, h, 6), modes in the order of :data:`MODES` [m/m, rad/m].
-    origin
-        The point whose motions these are, in the vessel frame of the file [m].
-    phase_origin
-        Where in plan the wave has zero phase [m].
-    depth
-        Water depth, infinite for deep water [m].
-    speed
-        Forward speed at which the operators hold [m/s].
-    source
-        The file or program they come from.
-    notes
-        What the reader found and converted, a sentence each.
-
     Raises
     ------
     InputError
@@ -90,16 +67,20 @@ class VesselRaos(ReadOnlyArrays):
     (1+0j)
     """
 
-    name: str
+    name: str  #: What the vessel is called.
+    #: Wave frequencies as felt by a vessel at rest, strictly ascending, above zero (k,) [rad/s].
     omega: FloatArray
+    #: Where the waves travel towards, strictly ascending in [0, 2 pi) (h,) [rad].
     heading: FloatArray
+    #: Motion per wave amplitude (k, h, 6), modes in the order of :data:`MODES` [m/m, rad/m].
     values: ComplexArray
+    #: The point whose motions these are, in the vessel frame of the file [m].
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    phase_origin: tuple[float, float] = (0.0, 0.0)
-    depth: float = math.inf
-    speed: float = 0.0
-    source: str = ""
-    notes: tuple[str, ...] = ()
+    phase_origin: tuple[float, float] = (0.0, 0.0)  #: Where in plan the wave has zero phase [m].
+    depth: float = math.inf  #: Water depth, infinite for deep water [m].
+    speed: float = 0.0  #: Forward speed at which the operators hold [m/s].
+    source: str = ""  #: The file or program they come from.
+    notes: tuple[str, ...] = ()  #: What the reader found and converted, a sentence each.
 
     def __post_init__(self) -> None:
         """Check the tables and make them read-only."""

@@ -64,19 +64,6 @@ class HeaveRao:
     Time factor e^{+i omega t}, heave positive up, against a wave elevation that has zero phase at
     the RAO's origin.
 
-    Attributes
-    ----------
-    omega
-        Frequencies, strictly ascending (k,), k >= 2 [rad/s].
-    amplitude
-        Amplitudes (k,) [m/m].
-    phase
-        Phases, positive where heave leads the wave (k,) [rad]; zero if left out.
-    below, beyond
-        What the operator is outside the table: one of :data:`BELOW` and one of :data:`BEYOND`.
-    owner
-        The field of the case that the table comes from, for messages.
-
     Raises
     ------
     InputError
@@ -90,11 +77,14 @@ class HeaveRao:
     [1.0, 0.7, 0.1]
     """
 
-    omega: FloatArray
-    amplitude: FloatArray
+    omega: FloatArray  #: Frequencies, strictly ascending (k,), k >= 2 [rad/s].
+    amplitude: FloatArray  #: Amplitudes (k,) [m/m].
+    #: Phases, positive where heave leads the wave (k,) [rad]; zero if left out.
     phase: FloatArray | None = None
+    #: What the operator is outside the table: one of :data:`BELOW` and one of :data:`BEYOND`.
     below: str = "unity"
     beyond: str = "decay"
+    #: The field of the case that the table comes from, for messages.
     owner: str = "vessel.heave_rao"
 
     def __post_init__(self) -> None:

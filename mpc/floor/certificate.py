@@ -36,26 +36,15 @@ _START = 10.0  # [m, m/s] no first state deviates by more, or by more than twice
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
-    """Residuals of the optimality conditions and a lower bound.
+    """Residuals of the optimality conditions and a lower bound."""
 
-    Attributes
-    ----------
-    primal
-        Largest excess over a limit, in units of the limit [-].
-    dual
-        Largest stationarity residual of inputs and first state, over the largest gradient term
-        (over rho where that is more) [-].
-    complementarity
-        Sum of the products of prices and slacks over the cost (over rho where that is more)
-        [-].
-    lower_bound
-        No controller keeps the payload's rms below this on the linear plant [m].
-    """
-
-    primal: float
+    primal: float  #: Largest excess over a limit, in units of the limit [-].
+    #: Largest stationarity residual of inputs and first state, over the largest gradient term (over
+    #: rho where that is more) [-].
     dual: float
+    #: Sum of the products of prices and slacks over the cost (over rho where that is more) [-].
     complementarity: float
-    lower_bound: float
+    lower_bound: float  #: No controller keeps the payload's rms below this on the linear plant [m].
 
     def __str__(self) -> str:
         """Return the residuals in a line."""

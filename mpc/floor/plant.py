@@ -60,71 +60,44 @@ class RecordPlant(ReadOnlyArrays):
     The demand d is the whole one, the static part included, in units of the peak torque; states
     are deviations from rest, drum and motor as haul [m] and haul rate [m/s], the rest in metres,
     metres a second and peak torques.
-
-    Parameters
-    ----------
-    sample_time
-        [s].
-    hold
-        What an input is: ``line``, demand at both ends of the sample (m = 2), or ``command``,
-        the command's deviation that is held (m = 1, in units of demand at rest).
-    states, Phi, Gamma, Psi
-        Names, (n,); matrices (n, n), (n, m), (n, 4).
-    scale
-        State of `models.plant.linear.LinearPlant` = scale * state here, (n,).
-    feedback
-        Of ``command``: demand = static demand + input - feedback . x, (n,).
-    command_gain
-        Demand per command, [N m per unit of the command].
-    command_feedback
-        Command per state at a given demand, (n,), and the same for both holds.
-    payload, speed
-        Rows that give payload displacement [m] and motor speed [rad/s], (n,).
-    torque
-        (coefficient of the demand, row of states (n,)) of the motor's torque in peak torques.
-    windows, window_names
-        Rows (on demand, on motor speed) with \|.\| <= 1, (nwin, 2): torque, speed, power,
-        breakdown, voltage.
-    tensions, tension_feed
-        Rows of the tensions that must not vanish, (nt, n), and of (z, z'), (nt, 2) [N].
-    static_tensions
-        Those at rest, (nt,) [N].
-    peak
-        Peak torque [N m].
-    static_demand, static_command
-        Demand [peak torques] and command at rest.
-    motor_state
-        Index of a motor's own state (current or torque of a drive that is not at once), or -1.
-    needed
-        Motor state that moves the drum with the hook's (z, z', z''), (3,), zero without one.
-    drag
-        Linear drag coefficient [N s/m].
     """
 
-    sample_time: float
+    sample_time: float  #: [s].
+    #: What an input is: ``line``, demand at both ends of the sample (m = 2), or ``command``, the
+    #: command's deviation that is held (m = 1, in units of demand at rest).
     hold: Hold
+    #: Names, (n,); matrices (n, n), (n, m), (n, 4).
     states: tuple[str, ...]
     Phi: FloatArray
     Gamma: FloatArray
     Psi: FloatArray
-    scale: FloatArray
-    feedback: FloatArray
-    command_gain: float
+    scale: FloatArray  #: State of `models.plant.linear.LinearPlant` = scale * state here, (n,).
+    feedback: FloatArray  #: Of ``command``: demand = static demand + input - feedback . x, (n,).
+    command_gain: float  #: Demand per command, [N m per unit of the command].
+    #: Command per state at a given demand, (n,), and the same for both holds.
     command_feedback: FloatArray
+    #: Rows that give payload displacement [m] and motor speed [rad/s], (n,).
     payload: FloatArray
     speed: FloatArray
+    #: (coefficient of the demand, row of states (n,)) of the motor's torque in peak torques.
     torque: tuple[float, FloatArray]
+    #: Rows (on demand, on motor speed) with \|.\| <= 1, (nwin, 2): torque, speed, power, breakdown,
+    #: voltage.
     windows: FloatArray
     window_names: tuple[str, ...]
+    #: Rows of the tensions that must not vanish, (nt, n), and of (z, z'), (nt, 2) [N].
     tensions: FloatArray
     tension_feed: FloatArray
-    static_tensions: FloatArray
-    peak: float
+    static_tensions: FloatArray  #: Those at rest, (nt,) [N].
+    peak: float  #: Peak torque [N m].
+    #: Demand [peak torques] and command at rest.
     static_demand: float
     static_command: float
+    #: Index of a motor's own state (current or torque of a drive that is not at once), or -1.
     motor_state: int
+    #: Motor state that moves the drum with the hook's (z, z', z''), (3,), zero without one.
     needed: FloatArray
-    drag: float
+    drag: float  #: Linear drag coefficient [N s/m].
 
     @property
     def inputs(self) -> int:

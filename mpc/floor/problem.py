@@ -23,28 +23,16 @@ RHO_START = 1e-6  # of the first state: its fast rope modes do next to nothing
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordProblem:
-    """A plant, a record of the hook, and what counts.
+    """A plant, a record of the hook, and what counts."""
 
-    Parameters
-    ----------
-    plant
-        The sampled plant.
-    heave, rate, acceleration
-        The hook's motion at the samples, (N+1,) [m, m/s, m/s2].
-    first
-        First sample whose payload displacement counts.
-    minimum_tension
-        What tensions must not fall below [N]; -inf for no such limit.
-    start
-        State at the first sample, (n,); None: free, which no controller can beat.
-    """
-
-    plant: RecordPlant
+    plant: RecordPlant  #: The sampled plant.
+    #: The hook's motion at the samples, (N+1,) [m, m/s, m/s2].
     heave: FloatArray
     rate: FloatArray
     acceleration: FloatArray
-    first: int
-    minimum_tension: float
+    first: int  #: First sample whose payload displacement counts.
+    minimum_tension: float  #: What tensions must not fall below [N]; -inf for no such limit.
+    #: State at the first sample, (n,); None: free, which no controller can beat.
     start: FloatArray | None
 
     @cached_property
@@ -88,22 +76,12 @@ class RecordProblem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordSolution:
-    """A solver's answer, by samples.
+    """A solver's answer, by samples."""
 
-    Parameters
-    ----------
-    start, inputs
-        y[0], (n,), and e, (N, m).
-    window_prices
-        Multiplier of the upper less that of the lower side of each window row, (N, 2, nwin).
-    tension_prices
-        Multipliers of the tension rows, (N, nt).
-    iterations
-        The solver's.
-    """
-
+    #: y[0], (n,), and e, (N, m).
     start: FloatArray
     inputs: FloatArray
+    #: Multiplier of the upper less that of the lower side of each window row, (N, 2, nwin).
     window_prices: FloatArray
-    tension_prices: FloatArray
-    iterations: int
+    tension_prices: FloatArray  #: Multipliers of the tension rows, (N, nt).
+    iterations: int  #: The solver's.

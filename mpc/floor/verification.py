@@ -26,24 +26,12 @@ _PAYLOAD, _LIMITS = 1e-5, 1e-5  # allowed [m], and share of a limit [-]
 
 @dataclass(frozen=True, kw_only=True)
 class RecordVerification:
-    """What another simulation of the same demand says.
+    """What another simulation of the same demand says."""
 
-    Attributes
-    ----------
-    payload_rms
-        Found by the other route [m].
-    payload_error
-        Largest difference of the payload's displacement at the samples [m].
-    excess
-        Largest excess over a limit, at the samples, as a share of the limit [-].
-    passed
-        Whether rms and limits are confirmed.
-    """
-
-    payload_rms: float
-    payload_error: float
-    excess: float
-    passed: bool
+    payload_rms: float  #: Found by the other route [m].
+    payload_error: float  #: Largest difference of the payload's displacement at the samples [m].
+    excess: float  #: Largest excess over a limit, at the samples, as a share of the limit [-].
+    passed: bool  #: Whether rms and limits are confirmed.
 
     def __str__(self) -> str:
         """Return it in a sentence."""

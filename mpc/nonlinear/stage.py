@@ -46,42 +46,25 @@ _VELOCITY, _SPEED, _ANGLE = "payload.velocity", "motor.speed", "motor.angle"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage(ReadOnlyArrays):
-    """One sample with m forces and my arguments; `make_stage` makes it.
+    """One sample with m forces and my arguments; `make_stage` makes it."""
 
-    Attributes
-    ----------
-    winch
-        The sampled linear winch, whose input is the mean torque of a sample if so asked for.
-    drift
-        The torque at the start over that mean.
-    law
-        The forces.
-    pairs
-        Which force depends on which argument, positions in n and y.
-    rest
-        y of a load that hangs at rest, (my,).
-    from_forces
-        F, (n, m).
-    C, D, C_hook, C_constants, own
-        y in the middle of the sample, less that at rest, of the state at its start, the input, the
-        hook's (z, z') at both ends, the constants and the forces: (my, n), (my,), (my, 4), (my, 2),
-        (my, m).
-    kernel
-        What evaluates forces and derivatives.
-    """
-
+    #: The sampled linear winch, whose input is the mean torque of a sample if so asked for.
     winch: SampledWinch
-    drift: Drift
-    law: ForceLaw
+    drift: Drift  #: The torque at the start over that mean.
+    law: ForceLaw  #: The forces.
+    #: Which force depends on which argument, positions in n and y.
     pairs: tuple[tuple[int, int], ...]
-    rest: FloatArray
-    from_forces: FloatArray
+    rest: FloatArray  #: y of a load that hangs at rest, (my,).
+    from_forces: FloatArray  #: F, (n, m).
+    #: y in the middle of the sample, less that at rest, of the state at its start, the input, the
+    #: hook's (z, z') at both ends, the constants and the forces: (my, n), (my,), (my, 4), (my, 2),
+    #: (my, m).
     C: FloatArray
     D: FloatArray
     C_hook: FloatArray
     C_constants: FloatArray
     own: FloatArray
-    kernel: Kernel
+    kernel: Kernel  #: What evaluates forces and derivatives.
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -179,21 +162,12 @@ class Argument:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ForceLaw:
-    """Forces n of arguments y; `force_law` makes it.
+    """Forces n of arguments y; `force_law` makes it."""
 
-    Attributes
-    ----------
-    arguments
-        By name, in the order of y, (my).
-    columns
-        Effect of each force on the state's derivative, by name, in the order of n, (m).
-    function
-        casadi.Function y -> n.
-    """
-
-    arguments: Mapping[str, Argument]
+    arguments: Mapping[str, Argument]  #: By name, in the order of y, (my).
+    #: Effect of each force on the state's derivative, by name, in the order of n, (m).
     columns: Mapping[str, FloatArray]
-    function: ca.Function
+    function: ca.Function  #: casadi.Function y -> n.
 
 
 def force_law(

@@ -49,39 +49,21 @@ IntArray = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Condensed(ReadOnlyArrays):
-    """Matrices of the programme; `condense` makes it.
+    """Matrices of the programme; `condense` makes it."""
 
-    Attributes
-    ----------
-    horizon
-        Plant, blocks and unit of the moves.
-    H
-        (nb, nb), per unit of a move.
-    gradient, from_end
-        Gradient f of the horizon's columns but the moves, (nb, columns), and of the disturbance's
-        state at the end of the horizon, (nb, nh).
-    at
-        Sample of each row, (nr,).
-    kind
-        What each row is: a number of the caller's, (nr,).
-    rows
-        r_0 and R, by the horizon's columns, (nr, columns).
-    speeds
-        Signal on which the bounds of the moves depend (the motor's speed) at the start of each
-        block, by the horizon's columns, (nb, columns).
-    cost
-        What the cost is divided by.
-    """
-
-    horizon: Horizon
-    H: FloatArray
+    horizon: Horizon  #: Plant, blocks and unit of the moves.
+    H: FloatArray  #: (nb, nb), per unit of a move.
+    #: Gradient f of the horizon's columns but the moves, (nb, columns), and of the disturbance's
+    #: state at the end of the horizon, (nb, nh).
     gradient: FloatArray
     from_end: FloatArray
-    at: IntArray
-    kind: IntArray
-    rows: FloatArray
+    at: IntArray  #: Sample of each row, (nr,).
+    kind: IntArray  #: What each row is: a number of the caller's, (nr,).
+    rows: FloatArray  #: r_0 and R, by the horizon's columns, (nr, columns).
+    #: Signal on which the bounds of the moves depend (the motor's speed) at the start of each
+    #: block, by the horizon's columns, (nb, columns).
     speeds: FloatArray
-    cost: float
+    cost: float  #: What the cost is divided by.
 
     @property
     def blocks(self) -> tuple[int, ...]:
@@ -171,24 +153,15 @@ def condense(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Horizon(ReadOnlyArrays):
-    """A sampled plant of one input, and the blocks of its moves.
+    """A sampled plant of one input, and the blocks of its moves."""
 
-    Parameters
-    ----------
-    A, B, from_path, from_constants
-        (n, n), (n, 1), (n, 2 nw), (n, nc).
-    blocks
-        Length of each block in samples, (nb,).
-    unit
-        Input of a move of one.
-    """
-
+    #: (n, n), (n, 1), (n, 2 nw), (n, nc).
     A: FloatArray
     B: FloatArray
     from_path: FloatArray
     from_constants: FloatArray
-    blocks: tuple[int, ...]
-    unit: float
+    blocks: tuple[int, ...]  #: Length of each block in samples, (nb,).
+    unit: float  #: Input of a move of one.
 
     @cached_property
     def steps(self) -> int:

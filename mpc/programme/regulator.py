@@ -34,30 +34,19 @@ from models.basics import FloatArray, ReadOnlyArrays, SolverError, solve_discret
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LQRegulator(ReadOnlyArrays):
-    """Gains and value function; `lq_regulator` makes it.
+    """Gains and value function; `lq_regulator` makes it."""
 
-    Attributes
-    ----------
-    weight
-        rho: what an input of one costs, in squares of the output's unit.
-    P, N
-        Value function, (nx, nx), (nx, nz).
-    K, K_disturbance
-        d = -K x - K_disturbance zeta, (nx,), (nz,); d_infty is in the latter.
-    Phi, Gamma
-        (nz, nz), (nx, nz).
-    steady
-        d_infty, (nz,).
-    """
-
-    weight: float
+    weight: float  #: rho: what an input of one costs, in squares of the output's unit.
+    #: Value function, (nx, nx), (nx, nz).
     P: FloatArray
     N: FloatArray
+    #: d = -K x - K_disturbance zeta, (nx,), (nz,); d_infty is in the latter.
     K: FloatArray
     K_disturbance: FloatArray
+    #: (nz, nz), (nx, nz).
     Phi: FloatArray
     Gamma: FloatArray
-    steady: FloatArray
+    steady: FloatArray  #: d_infty, (nz,).
 
 
 def lq_regulator(

@@ -62,32 +62,23 @@ _SPEED_WINDOW = 0.01  # in which a drive counts an encoder's pulses [s]
 class ProcessNoise:
     """Standard deviations of what the model leaves out.
 
-    Parameters
-    ----------
-    force
-        White force on the payload that adds up to this in a second, over the static tension.
-    torque
-        The same at the motor, over the peak torque.
-    rope
-        Change of speed of each mass along the rope in a second, over the rms speed of the hook.
-    sensors
-        Error at every sample of a sensor, besides what the case says of it, over the rms of the
-        hook's motion (for a tension: over the static one).
-    unit
-        Slow error of the reference unit, of which the case says nothing, over the rms of the hook's
-        motion.  A filter that holds it to be impossible takes it for a sea of thirty standard
-        deviations.
-
     Raises
     ------
     InputError
         If one is negative, or `sensors` is not above zero.
     """
 
+    #: White force on the payload that adds up to this in a second, over the static tension.
     force: float = 1e-4
-    torque: float = 1e-3
+    torque: float = 1e-3  #: The same at the motor, over the peak torque.
+    #: Change of speed of each mass along the rope in a second, over the rms speed of the hook.
     rope: float = 1e-4
+    #: Error at every sample of a sensor, besides what the case says of it, over the rms of the
+    #: hook's motion (for a tension: over the static one).
     sensors: float = 1e-4
+    #: Slow error of the reference unit, of which the case says nothing, over the rms of the hook's
+    #: motion.  A filter that holds it to be impossible takes it for a sea of thirty standard
+    #: deviations.
     unit: float = 0.05
 
     def __post_init__(self) -> None:
@@ -100,52 +91,30 @@ class ProcessNoise:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PredictionModel(ReadOnlyArrays):
-    """Matrices of the augmented state; `prediction_model` makes it.
+    """Matrices of the augmented state; `prediction_model` makes it."""
 
-    Attributes
-    ----------
-    winch
-        The sampled plant.
-    sea
-        The shaping filter of the hook's motion.
-    waves
-        Its rms displacement, velocity and acceleration [m], [m/s], [m/s2].
-    errors
-        How many states the errors of the reference unit have, those of the slow one last.
-    A, B, G
-        (n, n), (n, 1), (n, ng).
-    known
-        How many columns of G are of the sea and the reference unit; the others are
-        what the model does not know (`with_noise`).
-    slow
-        Noise over a sample of a slow error of the reference unit of one metre rms, (2, 2).
-    now
-        Rows of what telemetry and reference unit take in at a sample, (5, n).
-    first, depth
-        Of each late signal: where its earlier values begin in chi, and how many there are.
-    C
-        Rows of the measurements, in the order of `models.sensing.plant.MEASURED`, (ny, n).
-    R
-        Variances of their white errors, (ny,).
-    hook
-        Rows of the hook's displacement and velocity, (2, n).
-    """
-
-    winch: SampledWinch
-    sea: ShapingFilter
-    waves: tuple[float, ...]
+    winch: SampledWinch  #: The sampled plant.
+    sea: ShapingFilter  #: The shaping filter of the hook's motion.
+    waves: tuple[float, ...]  #: Its rms displacement, velocity and acceleration [m], [m/s], [m/s2].
+    #: How many states the errors of the reference unit have, those of the slow one last.
     errors: int
+    #: (n, n), (n, 1), (n, ng).
     A: FloatArray
     B: FloatArray
     G: FloatArray
+    #: How many columns of G are of the sea and the reference unit; the others are what the model
+    #: does not know (`with_noise`).
     known: int
+    #: Noise over a sample of a slow error of the reference unit of one metre rms, (2, 2).
     slow: FloatArray
-    now: FloatArray
+    now: FloatArray  #: Rows of what telemetry and reference unit take in at a sample, (5, n).
+    #: Of each late signal: where its earlier values begin in chi, and how many there are.
     first: Mapping[str, int]
     depth: Mapping[str, int]
+    #: Rows of the measurements, in the order of `models.sensing.plant.MEASURED`, (ny, n).
     C: FloatArray
-    R: FloatArray
-    hook: FloatArray
+    R: FloatArray  #: Variances of their white errors, (ny,).
+    hook: FloatArray  #: Rows of the hook's displacement and velocity, (2, n).
 
     @property
     def size(self) -> int:

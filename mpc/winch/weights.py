@@ -85,34 +85,24 @@ _GROWS = 300.0  # penalty of growth over that
 class Weights:
     """What a linear predictive controller weighs.
 
-    Parameters
-    ----------
-    torque
-        What an input of the drive's peak torque costs, over a displacement of the hook's rms.
-    noise
-        What the filter reckons with besides the case's own noise.
-    stiffness
-        Axial stiffness of the rope that plans are made on, over that of the case
-        (`mpc.winch.planning`).
-    max_sensitivity
-        M_s of the unsaturated loop, broken at the torque; NaN if it was not looked at.
-    payload_rms
-        Payload's rms of the unsaturated loop in the case's sea [m], on the nominal plant and on
-        those of `OFF`; empty if it was not looked at.
-    forecast_error
-        Standard deviation of the hook's forecast three seconds ahead [m]; NaN if not looked at.
-
     Raises
     ------
     InputError
         If the weight is not above zero, or the stiffness beyond 0.1 to 10.
     """
 
+    #: What an input of the drive's peak torque costs, over a displacement of the hook's rms.
     torque: float
-    noise: ProcessNoise
+    noise: ProcessNoise  #: What the filter reckons with besides the case's own noise.
+    #: Axial stiffness of the rope that plans are made on, over that of the case
+    #: (`mpc.winch.planning`).
     stiffness: float = STIFFER
+    #: M_s of the unsaturated loop, broken at the torque; NaN if it was not looked at.
     max_sensitivity: float = math.nan
+    #: Payload's rms of the unsaturated loop in the case's sea [m], on the nominal plant and on
+    #: those of `OFF`; empty if it was not looked at.
     payload_rms: tuple[float, ...] = ()
+    #: Standard deviation of the hook's forecast three seconds ahead [m]; NaN if not looked at.
     forecast_error: float = math.nan
 
     def __post_init__(self) -> None:

@@ -19,30 +19,15 @@ from .cell import ComparisonQuestion, Floor, Prepared
 
 @dataclass(frozen=True, kw_only=True)
 class CellTask:
-    """Something to do.
+    """Something to do."""
 
-    Attributes
-    ----------
-    kind
-        "design", "run" or "trace".
-    name
-        The contender, or the design that is wanted.
-    height
-        Significant height [m].
-    seed
-        Seed of the run; -1 for a design.
-    law
-        The design that the contender is made of; None if it needs none.
-    moment
-        What to show the traces around [s].
-    """
-
-    kind: str
-    name: str
-    height: float
-    seed: int = -1
+    kind: str  #: "design", "run" or "trace".
+    name: str  #: The contender, or the design that is wanted.
+    height: float  #: Significant height [m].
+    seed: int = -1  #: Seed of the run; -1 for a design.
+    #: The design that the contender is made of; None if it needs none.
     law: StoredDesign | None = field(default=None, compare=False)
-    moment: float = 0.0
+    moment: float = 0.0  #: What to show the traces around [s].
 
     @property
     def group(self) -> tuple[str, float]:

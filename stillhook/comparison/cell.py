@@ -51,34 +51,18 @@ _SAMPLE = 0.05  # of the floor's demand, which may bend in any way from one to t
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComparisonQuestion:
-    """What all contenders are asked.
+    """What all contenders are asked."""
 
-    Attributes
-    ----------
-    case
-        The case that the controllers are made for.
-    duration, settle
-        Length of a run, and when its statistics begin [s].
-    mismatch
-        What of the plant is not as in the case.
-    masses
-        Masses along the rope of the plant; None for those of the case.
-    compiled
-        Whether the plant runs as C; None: if there is a compiler.
-    design_at
-        "each": linear laws are designed for every sea; "case": once, for that of the case.
-    starts
-        Starts of the searches for designs.
-    """
-
-    case: Case
+    case: Case  #: The case that the controllers are made for.
+    #: Length of a run, and when its statistics begin [s].
     duration: float
     settle: float
-    mismatch: Mismatch
-    masses: int | None = None
-    compiled: bool | None = None
+    mismatch: Mismatch  #: What of the plant is not as in the case.
+    masses: int | None = None  #: Masses along the rope of the plant; None for those of the case.
+    compiled: bool | None = None  #: Whether the plant runs as C; None: if there is a compiler.
+    #: "each": linear laws are designed for every sea; "case": once, for that of the case.
     design_at: str = "each"
-    starts: int = 8
+    starts: int = 8  #: Starts of the searches for designs.
 
     def known(self, height: float) -> Case:
         """Return the case with a significant height [m], as the controllers know it."""
@@ -97,42 +81,28 @@ class ComparisonQuestion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cell:
-    """What is kept of one run, as plain data.
+    """What is kept of one run, as plain data."""
 
-    Attributes
-    ----------
-    contender, height, seed
-        Which run: name, significant height [m], seed.
-    status, message
-        As in `models.run.run.Run`; "failed" if there is no run at all.
-    quantities
-        Quantities of `models.run.summary` by name, SI.
-    trips
-        How often the brake ended the controller's work, by kind.
-    broken
-        Share of the stored samples in which a limit was broken, by its name [1].
-    fallbacks, counts
-        What had to be replaced by the simulator, and what the controller counted itself.
-    step
-        Wall time of a step of a controller in Python: median, p99, max [s]; empty if compiled.
-    worst
-        When the payload was farthest from its place [s].
-    sample_time, wall
-        Sample time of the controller, and time that the run took [s].
-    """
-
+    #: Which run: name, significant height [m], seed.
     contender: str
     height: float
     seed: int
+    #: As in `models.run.run.Run`; "failed" if there is no run at all.
     status: str
     message: str = ""
+    #: Quantities of `models.run.summary` by name, SI.
     quantities: Mapping[str, float] = field(default_factory=dict)
+    #: How often the brake ended the controller's work, by kind.
     trips: Mapping[str, int] = field(default_factory=dict)
+    #: Share of the stored samples in which a limit was broken, by its name [1].
     broken: Mapping[str, float] = field(default_factory=dict)
+    #: What had to be replaced by the simulator, and what the controller counted itself.
     fallbacks: Mapping[str, int] = field(default_factory=dict)
     counts: Mapping[str, float] = field(default_factory=dict)
+    #: Wall time of a step of a controller in Python: median, p99, max [s]; empty if compiled.
     step: Mapping[str, float] = field(default_factory=dict)
-    worst: float = math.nan
+    worst: float = math.nan  #: When the payload was farthest from its place [s].
+    #: Sample time of the controller, and time that the run took [s].
     sample_time: float = math.nan
     wall: float = math.nan
 

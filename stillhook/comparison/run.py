@@ -190,24 +190,15 @@ def _heights(case: Case, heights: Sequence[float] | None) -> tuple[float, ...]:
 
 @dataclass(kw_only=True)
 class Campaign:
-    """Designs and runs of a comparison that are to be done, and what came of those that are.
+    """Designs and runs of a comparison that are to be done, and what came of those that are."""
 
-    Parameters
-    ----------
-    question, contenders, heights, seeds
-        What all are asked, who takes part, in seas of which height [m], with which seeds.
-    store
-        Where results are kept; None for nowhere.
-    progress
-        Called as progress(what, done, total), in runs.
-    """
-
+    #: What all are asked, who takes part, in seas of which height [m], with which seeds.
     question: ComparisonQuestion
     contenders: tuple[Contender, ...]
     heights: tuple[float, ...]
     seeds: tuple[int, ...]
-    store: Store | None
-    progress: Progress
+    store: Store | None  #: Where results are kept; None for nowhere.
+    progress: Progress  #: Called as progress(what, done, total), in runs.
     laws: dict[tuple[str, float], StoredDesign] = field(default_factory=dict)
     refused: dict[tuple[str, float], str] = field(default_factory=dict)
     cells: dict[tuple[str, float, int], Cell] = field(default_factory=dict)

@@ -24,25 +24,14 @@ what nobody can know, and the floor, which is no controller at all."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contender:
-    """One that takes part.
+    """One that takes part."""
 
-    Attributes
-    ----------
-    name
-        What it is called in tables and figures.
-    what, knows
-        One line each: what it is, and what it knows.
-    group
-        One of `GROUPS`.
-    recipe
-        How its controller is made; None for the floor.
-    """
-
-    name: str
+    name: str  #: What it is called in tables and figures.
+    #: One line each: what it is, and what it knows.
     what: str
     knows: str
-    group: str
-    recipe: Recipe | None
+    group: str  #: One of `GROUPS`.
+    recipe: Recipe | None  #: How its controller is made; None for the floor.
 
     @property
     def needs(self) -> str:

@@ -31,33 +31,16 @@ Make = Callable[[Case, StoredDesign | None], Controller]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recipe:
-    """How a controller is made.
+    """How a controller is made."""
 
-    Attributes
-    ----------
-    name
-        What it is called.
-    kind
-        "name", "law" (a design), "object" or "factory" (a function of the case).
-    make
-        Makes the controller for a case; of a design, from it.
-    design
-        The design, if it was given.
-    needs
-        What to design for a case, as for `design_law`; empty if it is not a design.
-    portable
-        Whether it can be sent to another process, and known again when work goes on.
-    identity
-        A digest that changes when the recipe does.
-    """
-
-    name: str
-    kind: str
-    make: Make
-    design: StoredDesign | None = None
-    needs: str = ""
+    name: str  #: What it is called.
+    kind: str  #: "name", "law" (a design), "object" or "factory" (a function of the case).
+    make: Make  #: Makes the controller for a case; of a design, from it.
+    design: StoredDesign | None = None  #: The design, if it was given.
+    needs: str = ""  #: What to design for a case, as for `design_law`; empty if it is not a design.
+    #: Whether it can be sent to another process, and known again when work goes on.
     portable: bool = True
-    identity: str = ""
+    identity: str = ""  #: A digest that changes when the recipe does.
 
     @property
     def gains(self) -> Mapping[str, float]:

@@ -33,28 +33,17 @@ HALF = "-half"
 
 @dataclass(frozen=True, kw_only=True)
 class StoredDesign:
-    """A linear law as plain data, exact to the last bit in JSON.
+    """A linear law as plain data, exact to the last bit in JSON."""
 
-    Attributes
-    ----------
-    values
-        The matrices A, B, C, D and the names of the measurements and inputs; empty where no
-        stable law was found.
-    ok
-        Whether it keeps every limit that it was designed for.
-    drive
-        "enforced" or "reported": whether the drive's limits were among these; empty if the
-        design was given.
-    status
-        The sentence of the design.
-    structure, parameters
-        The structure and its parameters by name; empty where there is no structure of a winch.
-    """
-
+    #: The matrices A, B, C, D and the names of the measurements and inputs; empty where no stable
+    #: law was found.
     values: Mapping[str, Any]
-    ok: bool
+    ok: bool  #: Whether it keeps every limit that it was designed for.
+    #: "enforced" or "reported": whether the drive's limits were among these; empty if the design
+    #: was given.
     drive: str = ""
-    status: str = ""
+    status: str = ""  #: The sentence of the design.
+    #: The structure and its parameters by name; empty where there is no structure of a winch.
     structure: str = ""
     parameters: Mapping[str, float] = field(default_factory=dict)
 

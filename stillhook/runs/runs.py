@@ -50,20 +50,11 @@ _EVENTS_SHOWN = 4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Runs(Sequence[Run]):
-    """Runs of one case, controller and scenario that differ in their seed alone.
+    """Runs of one case, controller and scenario that differ in their seed alone."""
 
-    Attributes
-    ----------
-    runs
-        The runs, at least one.
-    scenario
-        What was asked of them.
-    lock_limit
-        Size of the payload's error beyond which lock counted as lost [m]; None: not watched.
-    """
-
-    runs: tuple[Run, ...]
-    scenario: Scenario
+    runs: tuple[Run, ...]  #: The runs, at least one.
+    scenario: Scenario  #: What was asked of them.
+    #: Size of the payload's error beyond which lock counted as lost [m]; None: not watched.
     lock_limit: float | None = None
 
     def __post_init__(self) -> None:

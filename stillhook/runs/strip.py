@@ -48,38 +48,20 @@ _WIDTH, _RADIUS, _BOX = 0.62, 0.15, 0.2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """Where everything is over a part of a run, in the heights of one drawing [m].
+    """Where everything is over a part of a run, in the heights of one drawing [m]."""
 
-    Attributes
-    ----------
-    time
-        Times (n,) [s].
-    hook, payload
-        Heights of both (n,); the hook's place at rest is at `offset`, the payload's at 0.
-    angle
-        Angle that the drum has turned, hauling in positive (n,) [rad].
-    tension
-        Tension at the drum (n,) [N].
-    slack
-        Whether the rope is slack (n,).
-    ground, water
-        Heights of a seabed or deck, and of the water's surface (n,); None where there is none.
-    asked
-        Height that is asked of the payload (n,).
-    offset
-        Height at which the hook is drawn at rest.
-    """
-
-    time: FloatArray
+    time: FloatArray  #: Times (n,) [s].
+    #: Heights of both (n,); the hook's place at rest is at `offset`, the payload's at 0.
     hook: FloatArray
     payload: FloatArray
-    angle: FloatArray
-    tension: FloatArray
-    slack: npt.NDArray[np.bool_]
+    angle: FloatArray  #: Angle that the drum has turned, hauling in positive (n,) [rad].
+    tension: FloatArray  #: Tension at the drum (n,) [N].
+    slack: npt.NDArray[np.bool_]  #: Whether the rope is slack (n,).
+    #: Heights of a seabed or deck, and of the water's surface (n,); None where there is none.
     ground: FloatArray | None
     water: FloatArray | None
-    asked: FloatArray
-    offset: float
+    asked: FloatArray  #: Height that is asked of the payload (n,).
+    offset: float  #: Height at which the hook is drawn at rest.
 
     @classmethod
     def of(cls, run: Run, window: Window, scenario: Scenario | None = None) -> Scene:

@@ -86,30 +86,14 @@ _NONE = Estimate()
 
 @dataclass(frozen=True)
 class QuantityRow:
-    """One quantity, for each of the runs that are compared.
+    """One quantity, for each of the runs that are compared."""
 
-    Attributes
-    ----------
-    group
-        What it is about: "payload", "drive", "rope", or "most probable in 3 h".
-    name
-        Name in the summary of the runs.
-    label
-        What people call it.
-    unit
-        SI unit, or what `quantities.scale` makes of it.
-    figures
-        One for each.
-    note
-        A remark, such as the limit.
-    """
-
-    group: str
-    name: str
-    label: str
-    unit: str
-    figures: tuple[Estimate, ...]
-    note: str = ""
+    group: str  #: What it is about: "payload", "drive", "rope", or "most probable in 3 h".
+    name: str  #: Name in the summary of the runs.
+    label: str  #: What people call it.
+    unit: str  #: SI unit, or what `quantities.scale` makes of it.
+    figures: tuple[Estimate, ...]  #: One for each.
+    note: str = ""  #: A remark, such as the limit.
 
     @property
     def shown_unit(self) -> str:

@@ -41,30 +41,14 @@ _WHAT = "sweep"
 
 @dataclass(frozen=True, kw_only=True)
 class Draw:
-    """How the cases are drawn.
+    """How the cases are drawn."""
 
-    Attributes
-    ----------
-    spread
-        What varies, on the nominal case.
-    samples
-        Number of cases.
-    sampling
-        Method of `Spread.sample`.
-    seed
-        Of the draws and of the runs.
-    common_seed
-        Whether all runs have the same seed.
-    first
-        Number of the first case: a part of a longer sweep.
-    """
-
-    spread: Spread
-    samples: int
-    sampling: str
-    seed: int
-    common_seed: bool
-    first: int = 0
+    spread: Spread  #: What varies, on the nominal case.
+    samples: int  #: Number of cases.
+    sampling: str  #: Method of `Spread.sample`.
+    seed: int  #: Of the draws and of the runs.
+    common_seed: bool  #: Whether all runs have the same seed.
+    first: int = 0  #: Number of the first case: a part of a longer sweep.
 
     def seeds(self, indices: Iterable[int]) -> list[int]:
         """Return the seeds of the runs of cases, which depend on nothing but these."""

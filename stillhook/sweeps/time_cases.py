@@ -37,20 +37,11 @@ _PURPOSE = 7  # second entry of the seeds of cases; those of a run's own draws a
 
 @dataclass(frozen=True, kw_only=True)
 class CaseTask:
-    """A case to be run.
+    """A case to be run."""
 
-    Attributes
-    ----------
-    index
-        Its number in the sweep.
-    seed
-        Of its run.
-    changes, gains, faults
-        Values by path of the case, by gain, and by ``fault.`` path.
-    """
-
-    index: int
-    seed: int
+    index: int  #: Its number in the sweep.
+    seed: int  #: Of its run.
+    #: Values by path of the case, by gain, and by ``fault.`` path.
     changes: Mapping[str, float] = field(default_factory=dict, compare=False)
     gains: Mapping[str, float] = field(default_factory=dict, compare=False)
     faults: Mapping[str, float] = field(default_factory=dict, compare=False)
@@ -66,67 +57,37 @@ class CaseTask:
 
 @dataclass(frozen=True, kw_only=True)
 class CaseResult:
-    """What came of a case.
+    """What came of a case."""
 
-    Attributes
-    ----------
-    index
-        Its number in the sweep.
-    status
-        A name of `time_metrics.STATUS`.
-    message
-        Why it failed, if it did.
-    values
-        Metrics by name, SI; NaN where there is none.
-    wall
-        Time that it took, preparing included [s].
-    """
-
-    index: int
-    status: str
-    message: str = ""
+    index: int  #: Its number in the sweep.
+    status: str  #: A name of `time_metrics.STATUS`.
+    message: str = ""  #: Why it failed, if it did.
+    #: Metrics by name, SI; NaN where there is none.
     values: Mapping[str, float] = field(default_factory=dict)
-    wall: float = math.nan
+    wall: float = math.nan  #: Time that it took, preparing included [s].
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TimeQuestion:
-    """What every case of a sweep is asked; it does the cases, one after the other.
+    """What every case of a sweep is asked; it does the cases, one after the other."""
 
-    Attributes
-    ----------
-    case
-        The nominal case, which the controller is made for unless it follows.
-    recipe
-        How the controller is made.
-    metrics
-        What is kept, names of `time_metrics.METRICS`.
-    duration, settle
-        Length of a run, and when its statistics begin [s]; None: as `sh.simulate` has it.
-    scenario, options
-        The operation by its name, and its options.
-    masses, compiled
-        Of the simulated plant, as for `sh.simulate`.
-    design_follows
-        Whether the controller is made for each case; a design is then designed anew.
-    weighed
-        Whether a controller that does not follow knows the static load, by the load cell.
-    starts
-        Starts of the searches of designs that follow.
-    """
-
-    case: Case
-    recipe: Recipe
-    metrics: tuple[str, ...]
+    case: Case  #: The nominal case, which the controller is made for unless it follows.
+    recipe: Recipe  #: How the controller is made.
+    metrics: tuple[str, ...]  #: What is kept, names of `time_metrics.METRICS`.
+    #: Length of a run, and when its statistics begin [s]; None: as `sh.simulate` has it.
     duration: float
     settle: float | None = None
+    #: The operation by its name, and its options.
     scenario: str = "hold"
     options: Mapping[str, Any] = field(default_factory=dict)
+    #: Of the simulated plant, as for `sh.simulate`.
     masses: int | None = None
     compiled: bool | None = None
+    #: Whether the controller is made for each case; a design is then designed anew.
     design_follows: bool = False
+    #: Whether a controller that does not follow knows the static load, by the load cell.
     weighed: bool = True
-    starts: int = 8
+    starts: int = 8  #: Starts of the searches of designs that follow.
 
     def do(self, task: CaseTask, progress: Progress | None = None) -> CaseResult:
         """Return what comes of a case; what is wrong with it is part of the answer.

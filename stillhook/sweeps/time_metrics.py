@@ -39,24 +39,12 @@ _WORSE = 1.0  # of the hook's rms is the payload's error in a limit cycle
 
 @dataclass(frozen=True, kw_only=True)
 class Metric:
-    """A number of a run.
+    """A number of a run."""
 
-    Attributes
-    ----------
-    quantity
-        Its name in `models.run.summary`, or a signal whose standard deviation it is.
-    unit
-        SI unit.
-    text
-        What it is, in a line.
-    factor
-        What the quantity is multiplied by.
-    """
-
-    quantity: str
-    unit: str
-    text: str
-    factor: float = 1.0
+    quantity: str  #: Its name in `models.run.summary`, or a signal whose standard deviation it is.
+    unit: str  #: SI unit.
+    text: str  #: What it is, in a line.
+    factor: float = 1.0  #: What the quantity is multiplied by.
 
     def of(self, run: Run) -> float:
         """Return the number of a run; NaN where it has none."""

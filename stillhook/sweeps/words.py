@@ -38,30 +38,15 @@ _NO_NUMBERS = ("stable", "status")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SweepSummary:
-    """What a sweep says.
+    """What a sweep says."""
 
-    Attributes
-    ----------
-    cases
-        Number of cases that were run.
-    stable
-        Share of them that is stable, with its 95 % interval.
-    statuses
-        How many ended otherwise, by status.
-    quantiles
-        By variable: quantiles of `QUANTILES` and the largest, of the stable cases.
-    units
-        By variable.
-    in_time
-        Whether cases were run in time, or loops looked at.
-    """
-
-    cases: int
-    stable: Share
-    statuses: Mapping[str, int]
+    cases: int  #: Number of cases that were run.
+    stable: Share  #: Share of them that is stable, with its 95 % interval.
+    statuses: Mapping[str, int]  #: How many ended otherwise, by status.
+    #: By variable: quantiles of `QUANTILES` and the largest, of the stable cases.
     quantiles: Mapping[str, tuple[float, ...]]
-    units: Mapping[str, str]
-    in_time: bool = True
+    units: Mapping[str, str]  #: By variable.
+    in_time: bool = True  #: Whether cases were run in time, or loops looked at.
 
     @classmethod
     def of(cls, result: xr.Dataset) -> SweepSummary:

@@ -20,20 +20,12 @@ from .table import Drawing
 
 @dataclass(frozen=True)
 class OutputFolder:
-    """A folder that can be written to, and what has been.
+    """A folder that can be written to, and what has been."""
 
-    Parameters
-    ----------
-    path
-        The folder; it is made with its parents by `prepare`.
-    kinds
-        Endings of the files of a figure; none for no figures.
-    written
-        The files that were written, in their order.
-    """
-
-    path: Path
+    path: Path  #: The folder; it is made with its parents by `prepare`.
+    #: Endings of the files of a figure; none for no figures.
     kinds: tuple[str, ...] = ("svg", "png")
+    #: The files that were written, in their order.
     written: list[Path] = field(default_factory=list)
 
     @classmethod

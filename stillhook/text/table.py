@@ -22,30 +22,15 @@ from .style import Figure
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
+    """A column of a table."""
 
-    Attributes
-    ----------
-    name
-        Its name in data: CSV, JSON.
-    label
-        What people call it; by default its name.
-    unit
-        SI unit of its figures, or what `quantities.scale` makes of it.
-    digits
-        Digits that count.
-    left
-        Whether it stands to the left, as words do.
-    write
-        Writes a figure, where unit and digits do not say how.
-    """
-
-    name: str
-    label: str | None = None
+    name: str  #: Its name in data: CSV, JSON.
+    label: str | None = None  #: What people call it; by default its name.
     _: KW_ONLY
-    unit: str = ""
-    digits: int = 3
-    left: bool = False
+    unit: str = ""  #: SI unit of its figures, or what `quantities.scale` makes of it.
+    digits: int = 3  #: Digits that count.
+    left: bool = False  #: Whether it stands to the left, as words do.
+    #: Writes a figure, where unit and digits do not say how.
     write: Callable[[Any], str] | None = None
 
     @property
@@ -117,29 +102,18 @@ class Bar:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Rows of figures and words under headings.
+    """Rows of figures and words under headings."""
 
-    Attributes
-    ----------
-    title
-        What it is about; the heading of the first column where that has none.
-    columns, rows
-        Columns, and for each row a cell for each of them: a number, a text, `Written`, `Bar`, or
-        None.
-    notes
-        Sentences that stand below it.
-    marked, broken
-        Rows that carry a star, and those that are not as they should be.
-    most
-        Rows on the terminal at most, the others are passed over evenly; all by default.
-    """
-
-    title: str = ""
+    title: str = ""  #: What it is about; the heading of the first column where that has none.
+    #: Columns, and for each row a cell for each of them: a number, a text, `Written`, `Bar`, or
+    #: None.
     columns: tuple[Column, ...]
     rows: Sequence[Sequence[Any]]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  #: Sentences that stand below it.
+    #: Rows that carry a star, and those that are not as they should be.
     marked: tuple[int, ...] = ()
     broken: tuple[int, ...] = ()
+    #: Rows on the terminal at most, the others are passed over evenly; all by default.
     most: int | None = None
 
     @property
@@ -202,30 +176,14 @@ class ReportSection:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What came of a study.
+    """What came of a study."""
 
-    Attributes
-    ----------
-    name
-        Name of the case, or of what was looked at.
-    about
-        What was asked.
-    status
-        The verdict, in a sentence.
-    ok
-        Whether all is well; None where that is not the question.
-    mark
-        What stands before the verdict instead of ok or NOT OK.
-    sections
-        All else, in the order in which it is read.
-    """
-
-    name: str
-    about: str = ""
-    status: str = ""
-    ok: bool | None = None
-    mark: str = ""
-    sections: Sequence[ReportSection] = ()
+    name: str  #: Name of the case, or of what was looked at.
+    about: str = ""  #: What was asked.
+    status: str = ""  #: The verdict, in a sentence.
+    ok: bool | None = None  #: Whether all is well; None where that is not the question.
+    mark: str = ""  #: What stands before the verdict instead of ok or NOT OK.
+    sections: Sequence[ReportSection] = ()  #: All else, in the order in which it is read.
 
     @property
     def verdict_mark(self) -> str:

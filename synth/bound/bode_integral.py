@@ -32,31 +32,17 @@ _QUANTILES = (0.05, 0.95)  # of the variance, between which a sea has its band
 
 @dataclass(frozen=True, kw_only=True)
 class BodeEstimate:
-    """What feedback can do in a band, by Bode's integral.
+    """What feedback can do in a band, by Bode's integral."""
 
-    Attributes
-    ----------
-    band
-        Width of the band of the disturbance [rad/s].
-    available
-        Frequency beyond which the loop has no gain left [rad/s].
-    max_sensitivity
-        M_s.
-    achieved
-        Geometric mean of |S| over the band.
-    resonance, resonant
-        The lightly damped mode of the closed loop at which |S| is highest [rad/s], and |S| there;
-        NaN without one.
-    damping, open_damping
-        Damping ratios of that mode, and of the one next to it without the loop.
-    """
-
-    band: float
-    available: float
-    max_sensitivity: float
-    achieved: float
+    band: float  #: Width of the band of the disturbance [rad/s].
+    available: float  #: Frequency beyond which the loop has no gain left [rad/s].
+    max_sensitivity: float  #: M_s.
+    achieved: float  #: Geometric mean of |S| over the band.
+    #: The lightly damped mode of the closed loop at which |S| is highest [rad/s], and |S| there;
+    #: NaN without one.
     resonance: float = math.nan
     resonant: float = math.nan
+    #: Damping ratios of that mode, and of the one next to it without the loop.
     damping: float = math.nan
     open_damping: float = math.nan
 

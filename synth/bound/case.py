@@ -93,31 +93,19 @@ class _Judged(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BestPossible:
-    """What linear controllers can do in a case at all, and what was found within an M_s.
+    """What linear controllers can do in a case at all, and what was found within an M_s."""
 
-    Attributes
-    ----------
-    case
-        The case, in the sea of the figures.
-    free
-        The lower bound: no linear controller does better, whatever its margins.
-    exact
-        The sensors that tell of payload or ship and that the case calls exact: with these the
-        bound hangs on the faint noise, and means little.
-    max_sensitivity
-        M_s of the best found: the case's limit, or the design's own where it is more.
-    own
-        The design's controller, and its payload rms on these terms [m]: with the noise of all
-        sensors that it hears, a faint one where they are exact; None without a design.
-    bode
-        What Bode's integral says of the design's loop; None without one.
-    """
-
-    case: Case
-    free: Bound
+    case: Case  #: The case, in the sea of the figures.
+    free: Bound  #: The lower bound: no linear controller does better, whatever its margins.
+    #: The sensors that tell of payload or ship and that the case calls exact: with these the bound
+    #: hangs on the faint noise, and means little.
     exact: tuple[str, ...]
+    #: M_s of the best found: the case's limit, or the design's own where it is more.
     max_sensitivity: float
+    #: The design's controller, and its payload rms on these terms [m]: with the noise of all
+    #: sensors that it hears, a faint one where they are exact; None without a design.
     own: HighOrder | None = None
+    #: What Bode's integral says of the design's loop; None without one.
     bode: BodeEstimate | None = None
     terms: _Terms = field(repr=False)
 
@@ -212,34 +200,20 @@ class BestPossible:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Terms:
-    """The terms on which controllers are compared.
+    """The terms on which controllers are compared."""
 
-    Attributes
-    ----------
-    case, hook
-        The case and its hook motion.
-    heard
-        What a controller hears.
-    masses, drag, friction
-        Rope masses of the bound's plant; linear drag coefficient [N s/m]; friction of losses
-        [N m s/rad].
-    faint
-        See `bound_for`.
-    limits
-        On the rms of outputs, by name.
-    said
-        Remarks.
-    """
-
+    #: The case and its hook motion.
     case: Case
     hook: HookMotion
-    heard: tuple[str, ...]
+    heard: tuple[str, ...]  #: What a controller hears.
+    #: Rope masses of the bound's plant; linear drag coefficient [N s/m]; friction of losses [N m
+    #: s/rad].
     masses: int
     drag: float
     friction: float
-    faint: float
-    limits: Mapping[str, float]
-    said: tuple[str, ...]
+    faint: float  #: See `bound_for`.
+    limits: Mapping[str, float]  #: On the rms of outputs, by name.
+    said: tuple[str, ...]  #: Remarks.
 
     def plant(self, masses: int) -> LinearPlant:
         """Return the plant on so many rope masses."""

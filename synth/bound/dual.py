@@ -74,24 +74,12 @@ def with_input_outputs(plant: LinearPlant, names: Sequence[str]) -> LinearPlant:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DualPoint:
-    """The LQG optimum for given multipliers.
+    """The LQG optimum for given multipliers."""
 
-    Attributes
-    ----------
-    multipliers
-        In the order of the limits, (m,).
-    regulator
-        The state feedback.
-    cost
-        Optimum of J0 + sum lambda J.
-    variances
-        Of every output of the plant with this controller, (nz,).
-    """
-
-    multipliers: FloatArray
-    regulator: LqgRegulator
-    cost: float
-    variances: FloatArray
+    multipliers: FloatArray  #: In the order of the limits, (m,).
+    regulator: LqgRegulator  #: The state feedback.
+    cost: float  #: Optimum of J0 + sum lambda J.
+    variances: FloatArray  #: Of every output of the plant with this controller, (nz,).
 
 
 class Dual:

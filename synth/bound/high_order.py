@@ -39,21 +39,12 @@ _PADE = 6  # of the delays, where poles are looked at
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HighOrder:
-    """A controller within an M_s, found and not proved to be the best.
+    """A controller within an M_s, found and not proved to be the best."""
 
-    Attributes
-    ----------
-    rms
-        Root of the weighted variance on the bound's plant, with its true spectra and delays.
-    controller
-        u = +C y.
-    margins
-        On the true plant.
-    """
-
+    #: Root of the weighted variance on the bound's plant, with its true spectra and delays.
     rms: float
-    controller: LinearController
-    margins: Margins
+    controller: LinearController  #: u = +C y.
+    margins: Margins  #: On the true plant.
 
     @property
     def order(self) -> int:

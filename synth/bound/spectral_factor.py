@@ -40,28 +40,18 @@ _EXACT = 1e-5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpectralFactor:
-    """A fitted factor, which can be fitted anew with other weights.
+    """A fitted factor, which can be fitted anew with other weights."""
 
-    Attributes
-    ----------
-    values
-        Logarithms of the sections' frequencies over `peak` and dampings, and of the gain.
-    sections, origin
-        Second-order sections of the denominator, and zeros at the origin.
-    peak, variance
-        Scales [rad/s], [unit squared].
-    band
-        Band that holds the spectrum's variance [rad/s].
-    omega, target
-        Frequencies [rad/s] and the true density there, (k,) each.
-    """
-
+    #: Logarithms of the sections' frequencies over `peak` and dampings, and of the gain.
     values: FloatArray
+    #: Second-order sections of the denominator, and zeros at the origin.
     sections: int
     origin: int
+    #: Scales [rad/s], [unit squared].
     peak: float
     variance: float
-    band: tuple[float, float]
+    band: tuple[float, float]  #: Band that holds the spectrum's variance [rad/s].
+    #: Frequencies [rad/s] and the true density there, (k,) each.
     omega: FloatArray
     target: FloatArray
 

@@ -110,21 +110,13 @@ class TrueCost:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrueProblem:
-    """A plant with its exact delays and spectra on nodes, next to its rational model.
+    """A plant with its exact delays and spectra on nodes, next to its rational model."""
 
-    Attributes
-    ----------
-    plant, model
-        Responses at the nodes, with the same signals.
-    weights
-        Of the quadrature, (k,).
-    spectra, fitted
-        One-sided densities of the disturbances, true and of the model, (nw, k).
-    """
-
+    #: Responses at the nodes, with the same signals.
     plant: PlantResponse
     model: PlantResponse
-    weights: FloatArray
+    weights: FloatArray  #: Of the quadrature, (k,).
+    #: One-sided densities of the disturbances, true and of the model, (nw, k).
     spectra: FloatArray
     fitted: FloatArray
 

@@ -131,32 +131,18 @@ class AffineLoop:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopBlocks:
-    """Responses at frequencies, (k,) first.
+    """Responses at frequencies, (k,) first."""
 
-    Attributes
-    ----------
-    functions
-        Of the basis, (k, count).
-    estimated, pushed
-        From innovations and from the command to the observer's states, (k, n, ny), (k, n).
-    error
-        From the observer's states to the innovations, (k, ny, n).
-    N, M
-        From noise on the measurements to the innovations, (k, ny, ny), and from v to the command.
-    X
-        From noise on the measurements to the command, at Q = 0, (k, ny).
-    yu
-        The model's, from the command to the measurements, (k, ny).
-    """
-
-    functions: ComplexArray
+    functions: ComplexArray  #: Of the basis, (k, count).
+    #: From innovations and from the command to the observer's states, (k, n, ny), (k, n).
     estimated: ComplexArray
     pushed: ComplexArray
-    error: ComplexArray
+    error: ComplexArray  #: From the observer's states to the innovations, (k, ny, n).
+    #: From noise on the measurements to the innovations, (k, ny, ny), and from v to the command.
     N: ComplexArray
     M: ComplexArray
-    X: ComplexArray
-    yu: ComplexArray
+    X: ComplexArray  #: From noise on the measurements to the command, at Q = 0, (k, ny).
+    yu: ComplexArray  #: The model's, from the command to the measurements, (k, ny).
 
     @cached_property
     def slope(self) -> ComplexArray:
@@ -167,30 +153,15 @@ class LoopBlocks:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class YoulaDesign:
-    """A controller of full order, and what it achieves.
+    """A controller of full order, and what it achieves."""
 
-    Attributes
-    ----------
-    bound
-        The question, and the bound from below.
-    value
-        Root of the weighted variance on the true spectra: an upper value of the best possible.
-    rms
-        Of what is limited, by name.
-    max_sensitivity
-        The M_s that was asked for, or infinity.
-    weights
-        Of the functions, measurement by measurement, (q,).
-    loop
-        The loop that is affine in them.
-    """
-
-    bound: Bound
+    bound: Bound  #: The question, and the bound from below.
+    #: Root of the weighted variance on the true spectra: an upper value of the best possible.
     value: float
-    rms: Mapping[str, float]
-    max_sensitivity: float
-    weights: FloatArray
-    loop: AffineLoop = field(repr=False)
+    rms: Mapping[str, float]  #: Of what is limited, by name.
+    max_sensitivity: float  #: The M_s that was asked for, or infinity.
+    weights: FloatArray  #: Of the functions, measurement by measurement, (q,).
+    loop: AffineLoop = field(repr=False)  #: The loop that is affine in them.
 
     @cached_property
     def controller(self) -> LinearController:

@@ -30,21 +30,12 @@ from .systems import PerfectSystem
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Capability(ReadOnlyArrays):
-    """Largest regular heave that a winch can follow.
+    """Largest regular heave that a winch can follow."""
 
-    Attributes
-    ----------
-    periods
-        Periods of the heave (p,) [s].
-    criteria
-        The limits of the winch (c,).
-    heights
-        Double amplitude of the hook's heave at which each is reached (c, p) [m]; 0 where the load
-        at rest breaks it.
-    """
-
-    periods: FloatArray
-    criteria: tuple[Limit, ...]
+    periods: FloatArray  #: Periods of the heave (p,) [s].
+    criteria: tuple[Limit, ...]  #: The limits of the winch (c,).
+    #: Double amplitude of the hook's heave at which each is reached (c, p) [m]; 0 where the load at
+    #: rest breaks it.
     heights: FloatArray
 
     @property

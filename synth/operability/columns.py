@@ -28,27 +28,13 @@ _SPEEDS = (1e-3, 3e-2, 1.0)  # rms speeds of the payload whose drag the nodes ar
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SeaColumn:
-    """Seas of one peak period.
+    """Seas of one peak period."""
 
-    Attributes
-    ----------
-    period
-        T_p [s].
-    headings
-        Headings (h,) [rad], or None where the case knows none.
-    cases
-        The case in each heading (h,), at its own H_s.
-    hooks
-        The hook's motion in each (h,).
-    scalable
-        Whether the shape of the spectrum stays the same at another H_s.
-    """
-
-    period: float
-    headings: tuple[float, ...] | None
-    cases: tuple[Case, ...]
-    hooks: tuple[HookMotion, ...]
-    scalable: bool
+    period: float  #: T_p [s].
+    headings: tuple[float, ...] | None  #: Headings (h,) [rad], or None where the case knows none.
+    cases: tuple[Case, ...]  #: The case in each heading (h,), at its own H_s.
+    hooks: tuple[HookMotion, ...]  #: The hook's motion in each (h,).
+    scalable: bool  #: Whether the shape of the spectrum stays the same at another H_s.
 
     def hook(self, index: int, height: float) -> HookMotion:
         """Return the hook's motion in one heading at a significant height [m]."""

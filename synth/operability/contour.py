@@ -23,31 +23,17 @@ _ROUND = 1e-9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contour:
-    """Limiting significant heights over heading and peak period.
+    """Limiting significant heights over heading and peak period."""
 
-    Attributes
-    ----------
-    criteria
-        What must be kept (c,).
-    periods
-        Peak periods, ascending (p,) [s].
-    headings
-        Headings, ascending (h,) [rad], or None where the case knows none (h is then 1).
-    heights
-        By criterion, heading and period (c, h, p) [m]: 0 where the criterion is broken in a flat
-        sea, infinite where it is kept up to `highest`.
-    drag
-        Drag coefficient at the lowest of them (h, p) [N s/m].
-    highest
-        Highest H_s that was looked at [m].
-    """
-
-    criteria: tuple[Limit, ...]
-    periods: FloatArray
+    criteria: tuple[Limit, ...]  #: What must be kept (c,).
+    periods: FloatArray  #: Peak periods, ascending (p,) [s].
+    #: Headings, ascending (h,) [rad], or None where the case knows none (h is then 1).
     headings: FloatArray | None
+    #: By criterion, heading and period (c, h, p) [m]: 0 where the criterion is broken in a flat
+    #: sea, infinite where it is kept up to `highest`.
     heights: FloatArray
-    drag: FloatArray
-    highest: float = HIGHEST
+    drag: FloatArray  #: Drag coefficient at the lowest of them (h, p) [N s/m].
+    highest: float = HIGHEST  #: Highest H_s that was looked at [m].
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""

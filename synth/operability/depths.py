@@ -42,60 +42,34 @@ def drum_layer(case: Case) -> tuple[int, int]:
 
 @dataclass(frozen=True, kw_only=True)
 class OwnSea:
-    """What the case's own sea says: of its H_s, peak period and heading, between no points.
+    """What the case's own sea says: of its H_s, peak period and heading, between no points."""
 
-    Attributes
-    ----------
-    limit
-        The limiting H_s at its period and heading [m].
-    binding
-        Name of the criterion that sets it; empty where none does.
-    broken
-        Names of the criteria that are broken in it, by the rule and the tolerance of designs.
-    """
-
-    limit: float
-    binding: str
+    limit: float  #: The limiting H_s at its period and heading [m].
+    binding: str  #: Name of the criterion that sets it; empty where none does.
+    #: Names of the criteria that are broken in it, by the rule and the tolerance of designs.
     broken: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AtDepth:
-    """The contours with one length of rope paid out.
+    """The contours with one length of rope paid out."""
 
-    Attributes
-    ----------
-    case
-        The case with this length of rope paid out, its limits reported rather than enforced.
-    layer, layers
-        Of the drum, see `drum_layer`.
-    contours
-        By name of the system, see `STAGES`: ``loop`` where there is a design, ``held``,
-        ``perfect``, and ``reoptimised`` where it was asked for.
-    columns
-        The seas, one column for each period.
-    capability
-        The maker's lines: what the winch can follow in regular heave.
-    workable
-        Shares of the year by name of the system; empty without a scatter diagram.
-    own
-        The case's own sea, with the design or else with the drum held.
-    masses
-        Rope masses of the design's loop.
-    max_sensitivity
-        M_s of the design's loop with this rope, at the drag in the case's own sea; infinite where
-        it is unstable, NaN without a design.
-    """
-
+    #: The case with this length of rope paid out, its limits reported rather than enforced.
     case: Case
+    #: Of the drum, see `drum_layer`.
     layer: int
     layers: int
+    #: By name of the system, see `STAGES`: ``loop`` where there is a design, ``held``, ``perfect``,
+    #: and ``reoptimised`` where it was asked for.
     contours: Mapping[str, Contour]
-    columns: tuple[SeaColumn, ...]
-    capability: Capability
+    columns: tuple[SeaColumn, ...]  #: The seas, one column for each period.
+    capability: Capability  #: The maker's lines: what the winch can follow in regular heave.
+    #: Shares of the year by name of the system; empty without a scatter diagram.
     workable: Mapping[str, Workable]
-    own: OwnSea
-    masses: int
+    own: OwnSea  #: The case's own sea, with the design or else with the drum held.
+    masses: int  #: Rope masses of the design's loop.
+    #: M_s of the design's loop with this rope, at the drag in the case's own sea; infinite where it
+    #: is unstable, NaN without a design.
     max_sensitivity: float = math.nan
 
     def __str__(self) -> str:

@@ -22,31 +22,18 @@ _WINCH = ("motor.torque", "motor.speed", "motor.current", "motor.voltage")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OperabilityQuestion:
-    """One rope length: what is moved, and what must be kept.
+    """One rope length: what is moved, and what must be kept."""
 
-    Attributes
-    ----------
-    case
-        The case, its limits reported rather than enforced.
-    held, perfect
-        The hook with the drum held, and a winch that holds the rope's upper end still.
-    loop
-        The design's loop; None where a case alone was asked about.
-    criteria
-        By name of the system, ``held``, ``perfect`` and ``loop``: stability first.
-    masses
-        Rope masses of the loop.
-    own
-        The loop in the case's own sea, with this length of rope; None where it has no stationary
-        motion, or where a case alone was asked about.
-    """
-
-    case: Case
+    case: Case  #: The case, its limits reported rather than enforced.
+    #: The hook with the drum held, and a winch that holds the rope's upper end still.
     held: HeldSystem
     perfect: PerfectSystem
-    loop: LoopSystem | None
+    loop: LoopSystem | None  #: The design's loop; None where a case alone was asked about.
+    #: By name of the system, ``held``, ``perfect`` and ``loop``: stability first.
     criteria: dict[str, tuple[Limit, ...]]
-    masses: int = 1
+    masses: int = 1  #: Rope masses of the loop.
+    #: The loop in the case's own sea, with this length of rope; None where it has no stationary
+    #: motion, or where a case alone was asked about.
     own: Assessment | None = None
 
     @property

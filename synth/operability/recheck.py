@@ -24,26 +24,17 @@ _TOLERANCE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class ContourCheck:
-    """One point of a contour, evaluated once more.
+    """One point of a contour, evaluated once more."""
 
-    Attributes
-    ----------
-    period, heading, height
-        The sea: T_p [s], heading [rad] or None, the limiting H_s [m].
-    criterion
-        What binds there.
-    value, bound
-        Of the criterion, by the single evaluation, and what it may be.
-    drag, agreed
-        Drag coefficient of the contour, and of the single evaluation [N s/m].
-    """
-
+    #: The sea: T_p [s], heading [rad] or None, the limiting H_s [m].
     period: float
     heading: float | None
     height: float
-    criterion: str
+    criterion: str  #: What binds there.
+    #: Of the criterion, by the single evaluation, and what it may be.
     value: float
     bound: float
+    #: Drag coefficient of the contour, and of the single evaluation [N s/m].
     drag: float
     agreed: float
 

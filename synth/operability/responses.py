@@ -83,35 +83,19 @@ class SeaMoments:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DragResponses:
-    """Responses of a system on n nodes, with the drag coefficient as a variable.
+    """Responses of a system on n nodes, with the drag coefficient as a variable."""
 
-    Attributes
-    ----------
-    nodes
-        Frequencies and weights of the integrals (n,).
-    outputs
-        Names of the o outputs.
-    table
-        Responses of the outputs and, last, of the payload's velocity, to the w disturbances and,
-        last, to a force on the payload, at the coefficient `reference` (o + 1, w + 1, n); with
-        losses the motor's speed and a torque on it follow (o + 2, w + 2, n).
-    reference
-        Drag coefficient C_0 that the responses hold [N s/m].
-    losses
-        Whether there are losses; the responses hold none.
-    shares
-        Gain and phase error of the reference unit over the heave at the nodes, (0 to 2, n).
-    error
-        Which of the w disturbances that error is; the heave is the first.
-    """
-
-    nodes: Quadrature
-    outputs: tuple[str, ...]
+    nodes: Quadrature  #: Frequencies and weights of the integrals (n,).
+    outputs: tuple[str, ...]  #: Names of the o outputs.
+    #: Responses of the outputs and, last, of the payload's velocity, to the w disturbances and,
+    #: last, to a force on the payload, at the coefficient `reference` (o + 1, w + 1, n); with
+    #: losses the motor's speed and a torque on it follow (o + 2, w + 2, n).
     table: ComplexArray
-    reference: float
-    losses: bool = False
+    reference: float  #: Drag coefficient C_0 that the responses hold [N s/m].
+    losses: bool = False  #: Whether there are losses; the responses hold none.
+    #: Gain and phase error of the reference unit over the heave at the nodes, (0 to 2, n).
     shares: ComplexArray | None = None
-    error: int = 0
+    error: int = 0  #: Which of the w disturbances that error is; the heave is the first.
 
     @cached_property
     def _updates(self) -> list[ComplexArray]:

@@ -47,34 +47,21 @@ _HIGHEST = 60.0  # where seas end [rad/s]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class System(ABC):
-    """What is moved by the sea.
+    """What is moved by the sea."""
 
-    Attributes
-    ----------
-    outputs
-        The signals that are looked at.
-    slope
-        Drag coefficient per standard deviation of the payload's velocity [N s2/m2]; 0 where
-        the coefficient is fixed.
-    reference
-        Drag coefficient that the responses are computed with [N s/m]: the fixed one, or one of
-        the size that is to be expected.
-    noises
-        What disturbs besides the sea.
-    loss
-        Losses that switch with the motor's direction, if there are some.
-    mru
-        The motion reference unit whose error, which grows with the sea, is among the noises.
-    switching
-        The noise of losses that switch, which is among them too and hangs on the sea.
-    """
-
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  #: The signals that are looked at.
+    #: Drag coefficient per standard deviation of the payload's velocity [N s2/m2]; 0 where the
+    #: coefficient is fixed.
     slope: float
+    #: Drag coefficient that the responses are computed with [N s/m]: the fixed one, or one of the
+    #: size that is to be expected.
     reference: float
-    noises: tuple[Disturbance, ...] = field(default=())
+    noises: tuple[Disturbance, ...] = field(default=())  #: What disturbs besides the sea.
+    #: The motion reference unit whose error, which grows with the sea, is among the noises.
     mru: MRU | None = None
+    #: The noise of losses that switch, which is among them too and hangs on the sea.
     switching: SwitchingNoise | None = None
+    #: Losses that switch with the motor's direction, if there are some.
     loss: LossElement | None = None
 
     @abstractmethod

@@ -44,30 +44,18 @@ RULES: Mapping[str, tuple[float, float]] = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Workable:
-    """Shares of the time in which one system can work [-].
+    """Shares of the time in which one system can work [-]."""
 
-    Attributes
-    ----------
-    share
-        Of the whole diagram: in the case's heading, or in those of the diagram where it has them.
-    best_heading
-        The same for a vessel that turns to its best heading in each sea; None without headings.
-    by_month
-        Share of each month that the diagram knows, by number.
-    by_heading
-        Share in each heading of the contour held all year [rad]: of the waves relative to the
-        bow, or (where the diagram has directions) of the bow relative to the diagram's axis.
-    outside
-        Share of the time whose periods lie outside the contour.
-    binding
-        Share of the time lost to each criterion, by name: that of the lowest limit.
-    """
-
+    #: Of the whole diagram: in the case's heading, or in those of the diagram where it has them.
     share: float
+    #: The same for a vessel that turns to its best heading in each sea; None without headings.
     best_heading: float | None
-    by_month: Mapping[int, float]
+    by_month: Mapping[int, float]  #: Share of each month that the diagram knows, by number.
+    #: Share in each heading of the contour held all year [rad]: of the waves relative to the bow,
+    #: or (where the diagram has directions) of the bow relative to the diagram's axis.
     by_heading: Mapping[float, float]
-    outside: float
+    outside: float  #: Share of the time whose periods lie outside the contour.
+    #: Share of the time lost to each criterion, by name: that of the lowest limit.
     binding: Mapping[str, float]
 
 

@@ -98,21 +98,11 @@ class Member:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Family:
-    """All plants and seas that a case stands for.
+    """All plants and seas that a case stands for."""
 
-    Attributes
-    ----------
-    case
-        The case that is varied.
-    axes
-        What varies.
-    seas
-        Sea states with their occurrence.
-    """
-
-    case: Case
-    axes: tuple[Axis, ...]
-    seas: tuple[SeaState, ...]
+    case: Case  #: The case that is varied.
+    axes: tuple[Axis, ...]  #: What varies.
+    seas: tuple[SeaState, ...]  #: Sea states with their occurrence.
 
     @classmethod
     def of(

@@ -37,26 +37,14 @@ _FLAT = 1e-9  # ratio of singular values below which a frequency gives one equat
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GainRadius:
-    """The errors of the gains, relative to their sizes, that a stable loop survives.
+    """The errors of the gains, relative to their sizes, that a stable loop survives."""
 
-    Attributes
-    ----------
-    names
-        The gains that may be off.
-    ball
-        Root sum of squares of the least errors that reach the stability boundary [-].
-    box
-        Every gain may be off by less than this share, all at once, in any direction [-].
-    omega
-        Where the boundary is first reached in the ball [rad/s]; 0 or infinity for a real pole.
-    worst, worst_box
-        Gains at the boundary, by name: the nearest in the ball, and the nearest in the box.
-    """
-
-    names: tuple[str, ...]
-    ball: float
-    box: float
+    names: tuple[str, ...]  #: The gains that may be off.
+    ball: float  #: Root sum of squares of the least errors that reach the stability boundary [-].
+    box: float  #: Every gain may be off by less than this share, all at once, in any direction [-].
+    #: Where the boundary is first reached in the ball [rad/s]; 0 or infinity for a real pole.
     omega: float
+    #: Gains at the boundary, by name: the nearest in the ball, and the nearest in the box.
     worst: Mapping[str, float]
     worst_box: Mapping[str, float]
 

@@ -23,33 +23,19 @@ _VERIFIED = 8  # scenarios, the hardest first, that are verified one by one
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScenarioResult:
-    """What the gains do in one scenario.
+    """What the gains do in one scenario."""
 
-    Attributes
-    ----------
-    name, member
-        Which it is.
-    weight
-        Occurrence of its sea.
-    design
-        The gains as a design for the scenario's own case; verified only if it is among the
-        hardest.
-    best_rms
-        For the regret: the payload's rms with gains of its own [m].
-    radius
-        How far every gain may be off at once [-], and the nearest unstable gains; None for
-        structures that are not affine in their gains.
-    pressure
-        How much of the objective hangs on the scenario; all of them add up to 1.
-    """
-
+    #: Which it is.
     name: str
     member: Member
-    weight: float
+    weight: float  #: Occurrence of its sea.
+    #: The gains as a design for the scenario's own case; verified only if it is among the hardest.
     design: Design
-    best_rms: float | None
+    best_rms: float | None  #: For the regret: the payload's rms with gains of its own [m].
+    #: How far every gain may be off at once [-], and the nearest unstable gains; None for
+    #: structures that are not affine in their gains.
     radius: GainRadius | None
-    pressure: float
+    pressure: float  #: How much of the objective hangs on the scenario; all of them add up to 1.
 
     @property
     def margins(self) -> Margins:
@@ -72,36 +58,21 @@ class ScenarioResult:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RobustDesign:
-    """One set of gains for a family, with everything that was asked of it.
+    """One set of gains for a family, with everything that was asked of it."""
 
-    Attributes
-    ----------
-    family, objective
-        The question.
-    ok, status
-        Every scenario keeps its limits, nothing in the ranges hurts more, no random draw is
-        unstable, and the hardest scenarios were verified; in words.
-    parameters
-        The structure's parameters by name.
-    scenarios
-        The set of members that was designed for, the worst payload motion first.
-    added
-        How many of them the search for the worst member added.
-    check
-        What random draws say.
-    plants
-        The family as it was posed.
-    """
-
+    #: The question.
     family: Family
     objective: Objective
+    #: Every scenario keeps its limits, nothing in the ranges hurts more, no random draw is
+    #: unstable, and the hardest scenarios were verified; in words.
     ok: bool
     status: str
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float]  #: The structure's parameters by name.
+    #: The set of members that was designed for, the worst payload motion first.
     scenarios: tuple[ScenarioResult, ...]
-    added: int
-    check: DrawCheck | None
-    plants: FamilyPlants
+    added: int  #: How many of them the search for the worst member added.
+    check: DrawCheck | None  #: What random draws say.
+    plants: FamilyPlants  #: The family as it was posed.
 
     @property
     def worst(self) -> ScenarioResult:

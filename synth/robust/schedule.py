@@ -58,32 +58,20 @@ class SchedulePoint(Figures):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GainSchedule:
-    """Gains over the rope's length.
+    """Gains over the rope's length."""
 
-    Attributes
-    ----------
-    case
-        The case.
-    lengths, gains
-        Nodes [m], ascending (k,), and the gains there, (k, number of gains).
-    names, amplifier
-        Names of the gains, and the fixed gain A.
-    ok, status
-        Whether it holds at every length that was looked at; in words.
-    points
-        What it does at many lengths.
-    verified
-        How many lengths were checked by other code and passed, of how many.
-    """
-
-    case: Case
+    case: Case  #: The case.
+    #: Nodes [m], ascending (k,), and the gains there, (k, number of gains).
     lengths: FloatArray
     gains: FloatArray
+    #: Names of the gains, and the fixed gain A.
     names: tuple[str, ...]
     amplifier: float = 1.0
+    #: Whether it holds at every length that was looked at; in words.
     ok: bool = False
     status: str = ""
-    points: tuple[SchedulePoint, ...] = ()
+    points: tuple[SchedulePoint, ...] = ()  #: What it does at many lengths.
+    #: How many lengths were checked by other code and passed, of how many.
     verified: tuple[int, int] = (0, 0)
 
     def __post_init__(self) -> None:

@@ -36,24 +36,14 @@ LOOSE = 5e-3  # relative excess over a limit that a draw on common nodes may hav
 
 @dataclass(frozen=True, kw_only=True)
 class Figures:
-    """What gains do to one member.
+    """What gains do to one member."""
 
-    Attributes
-    ----------
-    member
-        The member.
-    stable
-        Whether the loop is stable.
-    payload_rms, max_sensitivity
-        [m] and [-]; infinite where the loop is unstable.
-    use, limit
-        Largest use of a limit, and which.
-    """
-
-    member: Member
-    stable: bool
+    member: Member  #: The member.
+    stable: bool  #: Whether the loop is stable.
+    #: [m] and [-]; infinite where the loop is unstable.
     payload_rms: float
     max_sensitivity: float
+    #: Largest use of a limit, and which.
     use: float
     limit: str
 
@@ -66,34 +56,23 @@ class Figures:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrawCheck:
-    """What random members of the family say about gains.
+    """What random members of the family say about gains."""
 
-    Attributes
-    ----------
-    count, stable, kept
-        Draws, how many are stable, and how many keep every limit that was looked at (to 0.5 %).
-    interval
-        95 % confidence interval of the share that is stable (Clopper and Pearson 1934).
-    worst_rms, worst_use
-        The draws with the largest payload motion, and with the largest use of a limit.
-    quantiles
-        Payload rms [m] that 50, 90, 99 and 100 % of the stable draws stay below.
-    payload_rms, max_sensitivity
-        Of the stable draws [m], [-].
-    seed
-        Of the draws.
-    """
-
+    #: Draws, how many are stable, and how many keep every limit that was looked at (to 0.5 %).
     count: int
     stable: int
     kept: int
+    #: 95 % confidence interval of the share that is stable (Clopper and Pearson 1934).
     interval: tuple[float, float]
+    #: The draws with the largest payload motion, and with the largest use of a limit.
     worst_rms: Figures
     worst_use: Figures
+    #: Payload rms [m] that 50, 90, 99 and 100 % of the stable draws stay below.
     quantiles: Mapping[float, float]
+    #: Of the stable draws [m], [-].
     payload_rms: FloatArray
     max_sensitivity: FloatArray
-    seed: int
+    seed: int  #: Of the draws.
 
     def __str__(self) -> str:
         """Return the verdict in a line."""

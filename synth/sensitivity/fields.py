@@ -20,23 +20,12 @@ _NOT_PHYSICAL = ("stillhook", "name", "description", "sources", "limits", "gains
 
 @dataclass(frozen=True, kw_only=True)
 class Number:
-    """One number of a case.
+    """One number of a case."""
 
-    Attributes
-    ----------
-    path
-        Dotted path of the field.
-    value
-        Its value [SI]; of a table's column its factor, 1.
-    unit
-        Its unit.
-    column
-        The column itself where the number is a factor on it, else None.
-    """
-
-    path: str
-    value: float
-    unit: str
+    path: str  #: Dotted path of the field.
+    value: float  #: Its value [SI]; of a table's column its factor, 1.
+    unit: str  #: Its unit.
+    #: The column itself where the number is a factor on it, else None.
     column: tuple[float, ...] | None = None
 
     def change(self, value: float) -> dict[str, object]:

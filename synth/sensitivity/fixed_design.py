@@ -25,22 +25,14 @@ from .fields import numbers_of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FixedDesign:
-    """A design as sensitivity sees it.
+    """A design as sensitivity sees it."""
 
-    Attributes
-    ----------
-    design
-        The design, whose structure stays bound to the plant that it was made for.
-    case, values
-        The case that the figures hold for, and the structure's parameters.
-    known
-        Coefficients of the elements that are linearised with the response, where they are known:
-        on the unchanged case.
-    """
-
-    design: Design
+    design: Design  #: The design, whose structure stays bound to the plant that it was made for.
+    #: The case that the figures hold for, and the structure's parameters.
     case: Case
     values: tuple[float, ...]
+    #: Coefficients of the elements that are linearised with the response, where they are known: on
+    #: the unchanged case.
     known: Coefficients | None
 
     @classmethod

@@ -55,36 +55,22 @@ def evaluate_rows(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SobolIndices(ReadOnlyArrays):
-    """Sobol's indices of one figure.
+    """Sobol's indices of one figure."""
 
-    Attributes
-    ----------
-    figure
-        The figure.
-    paths
-        The numbers that vary, (d,).
-    first, total
-        First-order and total indices (d,) [-].
-    first_interval, total_interval
-        Their bootstrap intervals (d, 2) [-].
-    confidence
-        Level of the intervals [-].
-    samples, kept
-        Base points drawn, and those used: the largest power of two of which all crossings are
-        stable.
-    evaluations, unstable
-        Cases computed, and those of them that are unstable.
-    """
-
-    figure: str
-    paths: tuple[str, ...]
+    figure: str  #: The figure.
+    paths: tuple[str, ...]  #: The numbers that vary, (d,).
+    #: First-order and total indices (d,) [-].
     first: FloatArray
     total: FloatArray
+    #: Their bootstrap intervals (d, 2) [-].
     first_interval: FloatArray
     total_interval: FloatArray
-    confidence: float
+    confidence: float  #: Level of the intervals [-].
+    #: Base points drawn, and those used: the largest power of two of which all crossings are
+    #: stable.
     samples: int
     kept: int
+    #: Cases computed, and those of them that are unstable.
     evaluations: int
     unstable: int
 

@@ -23,32 +23,22 @@ FIGURES = ("payload_rms", "max_sensitivity", "torque_rms", "speed_rms")
 
 @dataclass(frozen=True, kw_only=True)
 class Elasticity:
-    """How a design answers to one number.
+    """How a design answers to one number."""
 
-    Attributes
-    ----------
-    path
-        Dotted path of the number in the case, or ``gains.`` and the name of a gain.
-    value, unit
-        What it is now [in its unit, SI]; of a table's column the factor 1.
-    payload_rms, max_sensitivity, torque_rms, speed_rms
-        d ln(figure) / d ln(number) [-].  An optimal design often has several peaks of |S| at its
-        limit; then M_s has a kink, and the slope is that of the peak which moves most.
-    curvature
-        d2 ln(payload_rms) / d ln(number)2 [-]; None where it was not asked for.
-    side
-        ``below`` or ``above`` where the number stands at the corner of a table, as a heading at a
-        row of the vessel's operators: what a smaller or a larger value does; else empty.
-    """
-
-    path: str
+    path: str  #: Dotted path of the number in the case, or ``gains.`` and the name of a gain.
+    #: What it is now [in its unit, SI]; of a table's column the factor 1.
     value: float
     unit: str
+    #: d ln(figure) / d ln(number) [-].  An optimal design often has several peaks of |S| at its
+    #: limit; then M_s has a kink, and the slope is that of the peak which moves most.
     payload_rms: float
     max_sensitivity: float
     torque_rms: float
     speed_rms: float
+    #: d2 ln(payload_rms) / d ln(number)2 [-]; None where it was not asked for.
     curvature: float | None = None
+    #: ``below`` or ``above`` where the number stands at the corner of a table, as a heading at a
+    #: row of the vessel's operators: what a smaller or a larger value does; else empty.
     side: str = ""
 
     @property
@@ -64,22 +54,13 @@ class Elasticity:
 
 @dataclass(frozen=True, kw_only=True)
 class Moved:
-    """A design with one number moved, recomputed in full.
+    """A design with one number moved, recomputed in full."""
 
-    Attributes
-    ----------
-    path, share
-        The number, and the share by which it was moved.
-    payload_rms
-        The payload's rms then [m]; infinite if the loop is unstable.
-    max_sensitivity
-        M_s then [-]; infinite if the loop is unstable.
-    """
-
+    #: The number, and the share by which it was moved.
     path: str
     share: float
-    payload_rms: float
-    max_sensitivity: float
+    payload_rms: float  #: The payload's rms then [m]; infinite if the loop is unstable.
+    max_sensitivity: float  #: M_s then [-]; infinite if the loop is unstable.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

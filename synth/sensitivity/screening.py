@@ -28,29 +28,20 @@ _ENDS = 0.01  # a normal distribution has no ends: the cube is cut there
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Screening(ReadOnlyArrays):
-    """Elementary effects of every number on the logarithm of one figure.
+    """Elementary effects of every number on the logarithm of one figure."""
 
-    Attributes
-    ----------
-    figure, paths
-        The figure, and the numbers that vary (d,).
-    mean_size, mean, spread
-        mu*, mu and sigma of the effects (d,) [-], in ln(figure) per range.
-    trajectories, evaluations, unstable
-        Trajectories, cases computed, and how many of them are unstable.
-    lost
-        Effects of each number that are left out for that, (d,).
-    """
-
+    #: The figure, and the numbers that vary (d,).
     figure: str
     paths: tuple[str, ...]
+    #: mu*, mu and sigma of the effects (d,) [-], in ln(figure) per range.
     mean_size: FloatArray
     mean: FloatArray
     spread: FloatArray
+    #: Trajectories, cases computed, and how many of them are unstable.
     trajectories: int
     evaluations: int
     unstable: int
-    lost: FloatArray
+    lost: FloatArray  #: Effects of each number that are left out for that, (d,).
 
     def __str__(self) -> str:
         """Return a small tree, the largest first."""

@@ -46,29 +46,16 @@ class CatalogueMotor:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChosenMotor:
-    """The motor chosen out of a catalogue.
+    """The motor chosen out of a catalogue."""
 
-    Attributes
-    ----------
-    name, motor, gear
-        Which, its figures, and the ratio of its gear.
-    case
-        The case with it, all limits enforced.
-    spare
-        Share of its limits that is left, at the tightest.
-    answer
-        Where its gains begin from.
-    smaller
-        Names of smaller motors that do not do it.
-    """
-
+    #: Which, its figures, and the ratio of its gear.
     name: str
     motor: MotorData
     gear: float
-    case: Case
-    spare: float
-    answer: Answer
-    smaller: tuple[str, ...]
+    case: Case  #: The case with it, all limits enforced.
+    spare: float  #: Share of its limits that is left, at the tightest.
+    answer: Answer  #: Where its gains begin from.
+    smaller: tuple[str, ...]  #: Names of smaller motors that do not do it.
 
 
 def read_catalogue(

@@ -48,34 +48,23 @@ class CoPoint:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CoDesign:
-    """The answer of `co_design`.
+    """The answer of `co_design`."""
 
-    Attributes
-    ----------
-    case, structure
-        The case given and the controller structure.
-    ok, status
-        Whether the design is verified; the sentence for the user.
-    gear, radius
-        The best ratio [-] and drum radius [m].
-    payload_rms, given_rms
-        Of the payload there, and behind the case's own gear (infinite if its limits cannot be
-        kept) [m].
-    points
-        All gears that were tried, by ratio.
-    best_case, design
-        The case with that gear, and its gains, verified.
-    """
-
+    #: The case given and the controller structure.
     case: Case
     structure: str
+    #: Whether the design is verified; the sentence for the user.
     ok: bool = False
     status: str
+    #: The best ratio [-] and drum radius [m].
     gear: float
     radius: float
+    #: Of the payload there, and behind the case's own gear (infinite if its limits cannot be kept)
+    #: [m].
     payload_rms: float = math.inf
     given_rms: float
-    points: tuple[CoPoint, ...]
+    points: tuple[CoPoint, ...]  #: All gears that were tried, by ratio.
+    #: The case with that gear, and its gains, verified.
     best_case: Case | None = None
     design: Design | None = None
 

@@ -29,25 +29,14 @@ _DRIVE = ("torque_continuous", "torque_peak", "power", "current_continuous", "cu
 
 @dataclass(frozen=True, kw_only=True)
 class MotorData:
-    """A motor in the figures that one buys it by.
+    """A motor in the figures that one buys it by."""
 
-    Attributes
-    ----------
-    torque_continuous, torque_peak
-        At the shaft [N m].
-    speed
-        Rated speed: base speed of an AC motor, highest speed of a DC motor [rad/s].
-    power
-        Rated power, continuous torque times that speed [W].
-    inertia
-        Of the rotor [kg m2].
-    """
-
+    #: At the shaft [N m].
     torque_continuous: float
     torque_peak: float
-    speed: float
-    power: float
-    inertia: float
+    speed: float  #: Rated speed: base speed of an AC motor, highest speed of a DC motor [rad/s].
+    power: float  #: Rated power, continuous torque times that speed [W].
+    inertia: float  #: Of the rotor [kg m2].
 
     @classmethod
     def of(cls, case: Case) -> MotorData:

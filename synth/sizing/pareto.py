@@ -41,21 +41,11 @@ _LONGEST = 0.2  # of a telemetry delay [s]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParetoPoint:
-    """One point of a front.
+    """One point of a front."""
 
-    Attributes
-    ----------
-    bound
-        What the other quantity was held to.
-    name
-        Name of the limit that it bounds, if it does.
-    answer
-        The optimum.
-    """
-
-    bound: float
-    name: str
-    answer: Answer
+    bound: float  #: What the other quantity was held to.
+    name: str  #: Name of the limit that it bounds, if it does.
+    answer: Answer  #: The optimum.
 
     @cached_property
     def value(self) -> float:
@@ -100,28 +90,16 @@ class ParetoPoint:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParetoFront:
-    """A front: points in the order of their bounds.
+    """A front: points in the order of their bounds."""
 
-    Attributes
-    ----------
-    case, against, unit
-        The question.
-    points
-        The points that hold, the bound ascending.
-    lost
-        Bounds at which no point was found.
-    amplifier
-        The fixed gain A of payload feedback.
-    verified
-        How many points were checked by other code and passed, of how many.
-    """
-
+    #: The question.
     case: Case
     against: str
     unit: str
-    points: tuple[ParetoPoint, ...]
-    lost: tuple[float, ...]
-    amplifier: float
+    points: tuple[ParetoPoint, ...]  #: The points that hold, the bound ascending.
+    lost: tuple[float, ...]  #: Bounds at which no point was found.
+    amplifier: float  #: The fixed gain A of payload feedback.
+    #: How many points were checked by other code and passed, of how many.
     verified: tuple[int, int] = (0, 0)
 
     @property

@@ -51,29 +51,15 @@ _LOWEST, _HIGHEST = 0.05, 6.0  # of the sea asked for, that are looked at
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SizePoint:
-    """The smallest motor behind one gear.
+    """The smallest motor behind one gear."""
 
-    Attributes
-    ----------
-    gear
-        Turns of the motor per turn of the drum.
-    scale
-        Continuous torque over that of the case's motor; infinite if no motor does it.
-    motor
-        Its figures; None if no motor does it.
-    payload_rms
-        Of the payload [m].
-    binding
-        Names of the limits that bind, or of those that stop it.
-    answer
-        The optimum there, or the last one looked at; None where there was none.
-    """
-
-    gear: float
+    gear: float  #: Turns of the motor per turn of the drum.
+    #: Continuous torque over that of the case's motor; infinite if no motor does it.
     scale: float = math.inf
-    motor: MotorData | None = None
-    payload_rms: float = math.inf
-    binding: tuple[str, ...]
+    motor: MotorData | None = None  #: Its figures; None if no motor does it.
+    payload_rms: float = math.inf  #: Of the payload [m].
+    binding: tuple[str, ...]  #: Names of the limits that bind, or of those that stop it.
+    #: The optimum there, or the last one looked at; None where there was none.
     answer: Answer | None = field(default=None, repr=False)
 
     @property

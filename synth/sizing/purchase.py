@@ -58,31 +58,18 @@ _WORTH = 0.01  # share of the rms below which nothing is worth its money
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Item:
-    """One figure that could be another.
+    """One figure that could be another."""
 
-    Attributes
-    ----------
-    name, kind
-        What it is called; ``drive``, ``rope``, ``sensor``, ``link``, ``gear`` or ``margin``.
-    value, unit
-        What it is [SI].
-    better
-        1 if more is better, -1 if less is, 0 if that has to be found out.
-    step
-        A natural step of it [SI], as 10 ms of delay.
-    limit
-        Name of the limit whose bound it is, if it is one.
-    changes
-        Returns the changes of the case, by dotted path, that make it so many times as large.
-    """
-
+    #: What it is called; ``drive``, ``rope``, ``sensor``, ``link``, ``gear`` or ``margin``.
     name: str
     kind: str
+    #: What it is [SI].
     value: float
     unit: str
-    better: int
-    step: float
-    limit: str | None = None
+    better: int  #: 1 if more is better, -1 if less is, 0 if that has to be found out.
+    step: float  #: A natural step of it [SI], as 10 ms of delay.
+    limit: str | None = None  #: Name of the limit whose bound it is, if it is one.
+    #: Returns the changes of the case, by dotted path, that make it so many times as large.
     changes: Callable[[float], dict[str, float]] | None = None
 
     @property
@@ -190,54 +177,33 @@ def _number_at(case: Case, path: str) -> float | None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WorthRow:
-    """What one figure is worth.
+    """What one figure is worth."""
 
-    Attributes
-    ----------
-    item
-        The figure: its name, value, unit, and what kind of thing it is.
-    elasticity
-        d log(rms) / d log(figure), by optimising again with the figure 5 % better; nan where
-        that could not be done.
-    per_step
-        What the payload's rms changes by if the figure gets better by its natural step [m].
-    factor, twice_rms
-        What the figure is multiplied by to be twice as good (a gear as far as the drive stands),
-        and the payload rms with it [m]; nan if that could not be done.
-    gain
-        What of the rms that takes away [m].
-    """
-
-    item: Item
+    item: Item  #: The figure: its name, value, unit, and what kind of thing it is.
+    #: d log(rms) / d log(figure), by optimising again with the figure 5 % better; nan where that
+    #: could not be done.
     elasticity: float = 0.0
+    #: What the payload's rms changes by if the figure gets better by its natural step [m].
     per_step: float = 0.0
+    #: What the figure is multiplied by to be twice as good (a gear as far as the drive stands), and
+    #: the payload rms with it [m]; nan if that could not be done.
     factor: float
     twice_rms: float
-    gain: float = 0.0
+    gain: float = 0.0  #: What of the rms that takes away [m].
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Worth:
-    """The answer of `worth`.
+    """The answer of `worth`."""
 
-    Attributes
-    ----------
-    case, structure
-        The case and the controller structure.
-    ok, status
-        Whether the optimum to begin with is one; the sentence for the user.
-    payload_rms
-        At the optimum [m].
-    rows
-        By what the figure twice as good takes away, most first.
-    """
-
+    #: The case and the controller structure.
     case: Case
     structure: str
+    #: Whether the optimum to begin with is one; the sentence for the user.
     ok: bool = False
     status: str
-    payload_rms: float
-    rows: tuple[WorthRow, ...] = ()
+    payload_rms: float  #: At the optimum [m].
+    rows: tuple[WorthRow, ...] = ()  #: By what the figure twice as good takes away, most first.
 
     @property
     def first(self) -> WorthRow | None:

@@ -40,46 +40,30 @@ _ROOM = 1.005  # by which the chosen motor is larger than the smallest
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sizing:
-    """The answer of `size_winch`.
+    """The answer of `size_winch`."""
 
-    Attributes
-    ----------
-    case, structure
-        The case in the sea asked for, its own motor in it, and the controller structure.
-    target, hook_rms
-        What the payload may move, and what the hook does (rms) [m].
-    ok, status
-        Whether a motor was found and verified; the sentence for the user.
-    unlimited_rms
-        What the loop's margins and the sensors alone leave, with a motor without limits [m].
-    points
-        The smallest motor behind each gear, by ratio.
-    chosen, sized_case, design
-        The smallest of all; the case with it, its limits enforced; its gains, verified.
-    given_rms
-        What the payload moves with the case's own motor and gear in that sea [m]; infinite if
-        they cannot keep their limits.
-    highest_height
-        H_s up to which the case's own winch meets the target [m]; 0 if in none that was looked
-        at.
-    choice
-        The motor out of the catalogue, if there is one.
-    """
-
+    #: The case in the sea asked for, its own motor in it, and the controller structure.
     case: Case
     structure: str
+    #: What the payload may move, and what the hook does (rms) [m].
     target: float
     hook_rms: float
+    #: Whether a motor was found and verified; the sentence for the user.
     ok: bool = False
     status: str
+    #: What the loop's margins and the sensors alone leave, with a motor without limits [m].
     unlimited_rms: float
-    points: tuple[SizePoint, ...] = ()
+    points: tuple[SizePoint, ...] = ()  #: The smallest motor behind each gear, by ratio.
+    #: The smallest of all; the case with it, its limits enforced; its gains, verified.
     chosen: SizePoint | None = None
     sized_case: Case | None = None
     design: Design | None = None
+    #: What the payload moves with the case's own motor and gear in that sea [m]; infinite if they
+    #: cannot keep their limits.
     given_rms: float = math.inf
+    #: H_s up to which the case's own winch meets the target [m]; 0 if in none that was looked at.
     highest_height: float = 0.0
-    choice: ChosenMotor | None = None
+    choice: ChosenMotor | None = None  #: The motor out of the catalogue, if there is one.
 
     def to_csv(self) -> str:
         """Return the smallest motor over the gear as CSV, SI units."""

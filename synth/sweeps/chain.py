@@ -58,53 +58,27 @@ _UNIT = float(White(1.0).density(1.0))  # of white noise of intensity one, a rad
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Shaken:
-    """What shakes loops, on the nodes where variances are taken.
+    """What shakes loops, on the nodes where variances are taken."""
 
-    Attributes
-    ----------
-    factors
-        Factor on the density of the hook's motion of each loop, (n,) or (1,).
-    ratios
-        Density over factor of each loop at the nodes, (n, k); None if all have the common one.
-    heave_rms
-        Standard deviation of each hook's heave [m], (n,) or (1,).
-    noisy
-        Whether sensors have noise and errors, or losses switch.
-    switching
-        Density at the nodes of what losses that switch are besides friction, over their square
-        (`models.sensing.SwitchingShape`), (n, k) or (1, k) [s/rad]; None without.
-    """
-
-    factors: FloatArray
+    factors: FloatArray  #: Factor on the density of the hook's motion of each loop, (n,) or (1,).
+    #: Density over factor of each loop at the nodes, (n, k); None if all have the common one.
     ratios: FloatArray | None
-    heave_rms: FloatArray
-    noisy: bool
+    heave_rms: FloatArray  #: Standard deviation of each hook's heave [m], (n,) or (1,).
+    noisy: bool  #: Whether sensors have noise and errors, or losses switch.
+    #: Density at the nodes of what losses that switch are besides friction, over their square
+    #: (`models.sensing.SwitchingShape`), (n, k) or (1, k) [s/rad]; None without.
     switching: Any = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChainLoops:
-    """Closed loops of a controller around a lumped rope, delays and low-passes exact.
+    """Closed loops of a controller around a lumped rope, delays and low-passes exact."""
 
-    Attributes
-    ----------
-    count
-        How many, n.
-    numbers
-        Their plants, as of `synth.sweeps.numbers.columns_of`.
-    law
-        The controller.
-    drag
-        Linear drag coefficient of each, (n,) or (1,) [N s/m].
-    lumps
-        How the rope is lumped.
-    """
-
-    count: int
-    numbers: Numbers
-    law: LawColumns
-    drag: FloatArray
-    lumps: RopeLumps
+    count: int  #: How many, n.
+    numbers: Numbers  #: Their plants, as of `synth.sweeps.numbers.columns_of`.
+    law: LawColumns  #: The controller.
+    drag: FloatArray  #: Linear drag coefficient of each, (n,) or (1,) [N s/m].
+    lumps: RopeLumps  #: How the rope is lumped.
 
     def __len__(self) -> int:
         return self.count

@@ -27,22 +27,14 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LawColumns:
-    """A controller's parameters as columns.
+    """A controller's parameters as columns."""
 
-    Attributes
-    ----------
-    law, measurements
-        The structure bound to its plant, and what it hears, in its plant's order.
-    values
-        Column of each parameter, (n,) or (1,); `synth.loop.Dual` numbers of one loop too.
-    poles
-        The controller's own poles, (n, p) or (1, p) [1/s].
-    """
-
+    #: The structure bound to its plant, and what it hears, in its plant's order.
     law: ParametrisedController
     measurements: tuple[str, ...]
+    #: Column of each parameter, (n,) or (1,); `synth.loop.Dual` numbers of one loop too.
     values: tuple[FloatArray, ...]
-    poles: ComplexArray
+    poles: ComplexArray  #: The controller's own poles, (n, p) or (1, p) [1/s].
 
     def part(self, index: IndexArray) -> LawColumns:
         """Return some of the rows."""

@@ -18,23 +18,15 @@ DEFAULT = ("payload_rms", "residual", "torque_rms", "speed_rms", "max_sensitivit
 
 @dataclass(frozen=True, kw_only=True)
 class FrequencyMetric:
-    """One number of a case.
+    """One number of a case."""
 
-    Attributes
-    ----------
-    name, unit, long_name
-        For the dataset.
-    output
-        The plant's output it is about, if any.
-    kind
-        ``rms``, ``residual`` (over the hook's rms), ``peak`` (largest in the exposure time, from
-        rest, with losses), ``least``, ``period`` (mean zero-crossing), ``loop`` or ``static``.
-    """
-
+    #: For the dataset.
     name: str
     unit: str
     long_name: str
-    output: str = ""
+    output: str = ""  #: The plant's output it is about, if any.
+    #: ``rms``, ``residual`` (over the hook's rms), ``peak`` (largest in the exposure time, from
+    #: rest, with losses), ``least``, ``period`` (mean zero-crossing), ``loop`` or ``static``.
     kind: str = "rms"
 
 

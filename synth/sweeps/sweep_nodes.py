@@ -57,21 +57,13 @@ _GAUSS = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SweepNodes(ReadOnlyArrays):
-    """Nodes with two rules on them.
+    """Nodes with two rules on them."""
 
-    Attributes
-    ----------
-    omega
-        Nodes, ascending (k,) [rad/s].
-    weights
-        The rules, (rules, k) [rad/s]: the one that counts, and the shorter one; the one alone if
-        there is none to compare with.
-    sea
-        The rules with the common density of the hook's motion in their weights, likewise [m2].
-    """
-
-    omega: FloatArray
+    omega: FloatArray  #: Nodes, ascending (k,) [rad/s].
+    #: The rules, (rules, k) [rad/s]: the one that counts, and the shorter one; the one alone if
+    #: there is none to compare with.
     weights: FloatArray
+    #: The rules with the common density of the hook's motion in their weights, likewise [m2].
     sea: FloatArray
 
     def __len__(self) -> int:

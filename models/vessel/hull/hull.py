@@ -31,24 +31,17 @@ _OPEN = 0.02  # of the volume by which its three expressions may differ for the 
 class Hull:
     """The wetted surface of a floating hull, in panels of four corners.
 
-    Attributes
-    ----------
-    name
-        What it is called.
-    panels
-        Corners of the panels (n, 4, 3) [m], all at or below z = 0; seen from the water they go
-        round counter-clockwise.  A triangle has its last corner twice.
-    inputs
-        What it was made from, for the provenance of what is computed with it.
-
     Raises
     ------
     InputError
         If a corner is not finite or above the waterline, or the surface is not closed below it.
     """
 
-    name: str
+    name: str  #: What it is called.
+    #: Corners of the panels (n, 4, 3) [m], all at or below z = 0; seen from the water they go round
+    #: counter-clockwise.  A triangle has its last corner twice.
     panels: FloatArray
+    #: What it was made from, for the provenance of what is computed with it.
     inputs: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -54,31 +54,19 @@ class NaturalPeriods:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hydrodynamics(ReadOnlyArrays):
-    """Coefficients of a body in waves, about one point.
+    """Coefficients of a body in waves, about one point."""
 
-    Attributes
-    ----------
-    omega
-        Frequencies (k,) [rad/s], strictly ascending.
-    heading
-        Where the waves travel towards (h,) [rad], strictly ascending in [0, 2 pi).
-    added_mass, damping
-        (k, 6, 6), from motion (last axis) to force [kg, kg m, kg m2] and the same per second.
-    excitation
-        Wave force per metre of amplitude (k, h, 6), phase against the elevation at the frame's
-        origin, time factor e^{+i omega t} [N/m, N].
-    point
-        The point about which they hold [m].
-    depth, density
-        Of the water [m], [kg/m3].
-    """
-
-    omega: FloatArray
+    omega: FloatArray  #: Frequencies (k,) [rad/s], strictly ascending.
+    #: Where the waves travel towards (h,) [rad], strictly ascending in [0, 2 pi).
     heading: FloatArray
+    #: (k, 6, 6), from motion (last axis) to force [kg, kg m, kg m2] and the same per second.
     added_mass: FloatArray
     damping: FloatArray
+    #: Wave force per metre of amplitude (k, h, 6), phase against the elevation at the frame's
+    #: origin, time factor e^{+i omega t} [N/m, N].
     excitation: ComplexArray
-    point: Point = (0.0, 0.0, 0.0)
+    point: Point = (0.0, 0.0, 0.0)  #: The point about which they hold [m].
+    #: Of the water [m], [kg/m3].
     depth: float = math.inf
     density: float = SEA_WATER_DENSITY
 
@@ -178,24 +166,14 @@ class Hydrodynamics(ReadOnlyArrays):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FloatingBody(ReadOnlyArrays):
-    """A body's mass and stiffness beside its hydrodynamics, all about the same point.
+    """A body's mass and stiffness beside its hydrodynamics, all about the same point."""
 
-    Attributes
-    ----------
-    hydrodynamics
-        Added mass, damping and wave force.
-    mass, stiffness
-        (6, 6), about `hydrodynamics.point`.
-    centre
-        Centre of gravity [m].
-    roll_damping
-        Damping of roll beyond that of the waves it makes, over the critical [-].
-    """
-
-    hydrodynamics: Hydrodynamics
+    hydrodynamics: Hydrodynamics  #: Added mass, damping and wave force.
+    #: (6, 6), about `hydrodynamics.point`.
     mass: FloatArray
     stiffness: FloatArray
-    centre: Point
+    centre: Point  #: Centre of gravity [m].
+    #: Damping of roll beyond that of the waves it makes, over the critical [-].
     roll_damping: float = 0.0
 
     def __post_init__(self) -> None:

@@ -26,29 +26,14 @@ from .hull import Hull, quadrature_rule
 
 @dataclass(frozen=True, kw_only=True)
 class Waterplane:
-    """Displaced volume and waterplane of a hull.
+    """Displaced volume and waterplane of a hull."""
 
-    Attributes
-    ----------
-    volume
-        Displaced volume [m3].
-    centre_of_buoyancy
-        Its centre [m].
-    area
-        Area of the waterplane [m2].
-    first
-        First moments of the waterplane: integrals of x and of y [m3].
-    second
-        Second moments: integrals of x^2, y^2 and x y [m4].
-    length, beam, draught
-        Of what is wet [m].
-    """
-
-    volume: float
-    centre_of_buoyancy: Point
-    area: float
-    first: tuple[float, float]
-    second: tuple[float, float, float]
+    volume: float  #: Displaced volume [m3].
+    centre_of_buoyancy: Point  #: Its centre [m].
+    area: float  #: Area of the waterplane [m2].
+    first: tuple[float, float]  #: First moments of the waterplane: integrals of x and of y [m3].
+    second: tuple[float, float, float]  #: Second moments: integrals of x^2, y^2 and x y [m4].
+    #: Of what is wet [m].
     length: float
     beam: float
     draught: float
@@ -96,21 +81,11 @@ class Waterplane:
 
 @dataclass(frozen=True, kw_only=True)
 class Loading:
-    """How the mass of a floating vessel is distributed.
+    """How the mass of a floating vessel is distributed."""
 
-    Attributes
-    ----------
-    mass
-        That of the displaced water [kg].
-    centre
-        Centre of gravity [m], above the centre of buoyancy.
-    radii
-        Radii of gyration about axes through it, of roll, pitch and yaw [m].
-    """
-
-    mass: float
-    centre: Point
-    radii: Point
+    mass: float  #: That of the displaced water [kg].
+    centre: Point  #: Centre of gravity [m], above the centre of buoyancy.
+    radii: Point  #: Radii of gyration about axes through it, of roll, pitch and yaw [m].
 
     @classmethod
     def of(

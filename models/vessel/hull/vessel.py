@@ -40,31 +40,16 @@ _CLOSEST = 0.006  # rad/s between two of them: a motion that passes zero bends a
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HullVessel:
-    """A hull, how it floats and how it moves.
+    """A hull, how it floats and how it moves."""
 
-    Attributes
-    ----------
-    hull
-        Its wetted surface.
-    waterplane, loading
-        Volume and waterplane; mass, centre of gravity, radii of gyration.
-    body
-        Coefficients, mass and stiffness about the frame's origin.
-    raos
-        The motions of the frame's origin.
-    warnings
-        What the figures should be taken with care for.
-    kept
-        Whether the coefficients came from the cache.
-    """
-
-    hull: Hull
+    hull: Hull  #: Its wetted surface.
+    #: Volume and waterplane; mass, centre of gravity, radii of gyration.
     waterplane: Waterplane
     loading: Loading
-    body: FloatingBody
-    raos: VesselRaos
-    warnings: tuple[str, ...] = ()
-    kept: bool = False
+    body: FloatingBody  #: Coefficients, mass and stiffness about the frame's origin.
+    raos: VesselRaos  #: The motions of the frame's origin.
+    warnings: tuple[str, ...] = ()  #: What the figures should be taken with care for.
+    kept: bool = False  #: Whether the coefficients came from the cache.
 
     @property
     def natural_periods(self) -> NaturalPeriods:

@@ -45,22 +45,13 @@ from .wamit import looks_like_wamit, parse_wamit
 
 @dataclass(frozen=True, kw_only=True)
 class Reader:
-    """A format of RAO files, and the function that reads it.
+    """A format of RAO files, and the function that reads it."""
 
-    Attributes
-    ----------
-    about
-        What such a file is.
-    parse
-        From the file's path, for messages, and its contents to the table.  Its keyword-only
-        arguments are what a user may say about such a file.
-    text
-        Whether the contents are text.
-    """
-
-    about: str
+    about: str  #: What such a file is.
+    #: From the file's path, for messages, and its contents to the table.  Its keyword-only
+    #: arguments are what a user may say about such a file.
     parse: Callable[..., VesselRaos]
-    text: bool = True
+    text: bool = True  #: Whether the contents are text.
 
     @property
     def options(self) -> list[str]:

@@ -64,20 +64,11 @@ _MISTAKES: tuple[tuple[str, ComplexArray, bool], ...] = tuple(
 
 @dataclass(frozen=True, kw_only=True)
 class LongWaveRow:
-    """One motion at one heading in the longest waves of a table.
+    """One motion at one heading in the longest waves of a table."""
 
-    Attributes
-    ----------
-    motion
-        Its name; angles are over the wave slope.
-    heading_deg
-        Where the waves travel towards [deg].
-    found, expected
-        The operator and its limit [-].
-    """
-
-    motion: str
-    heading_deg: float
+    motion: str  #: Its name; angles are over the wave slope.
+    heading_deg: float  #: Where the waves travel towards [deg].
+    #: The operator and its limit [-].
     found: complex
     expected: complex
 
@@ -102,31 +93,17 @@ class LongWaveRow:
 
 @dataclass(frozen=True, kw_only=True)
 class LongWaveCheck:
-    """A table against the limits of long waves.
+    """A table against the limits of long waves."""
 
-    Attributes
-    ----------
-    omega
-        The lowest frequency [rad/s].
-    wave_length
-        Length of its waves [m].
-    rows
-        Motions at headings near 0, 45, 90, 135 and 180 deg.
-    error
-        Weighted mean distance from the limits [-]; a wrong sign counts as 2, a wrong size little.
-    mistake
-        The mistake that would explain the table; empty if it keeps the limits, or if nothing
-        that is known does.
-    remarks
-        What a user should know, a sentence each.
-    """
-
-    omega: float
-    wave_length: float
-    rows: tuple[LongWaveRow, ...]
+    omega: float  #: The lowest frequency [rad/s].
+    wave_length: float  #: Length of its waves [m].
+    rows: tuple[LongWaveRow, ...]  #: Motions at headings near 0, 45, 90, 135 and 180 deg.
+    #: Weighted mean distance from the limits [-]; a wrong sign counts as 2, a wrong size little.
     error: float
+    #: The mistake that would explain the table; empty if it keeps the limits, or if nothing that is
+    #: known does.
     mistake: str
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  #: What a user should know, a sentence each.
 
     @property
     def long(self) -> bool:

@@ -25,35 +25,20 @@ TIME = quantity("time", 0.0, 1e8, open_low=True)
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationRequest:
-    """What is to be simulated.
+    """What is to be simulated."""
 
-    Attributes
-    ----------
-    case, scenario
-        Case and operation.
-    controllers
-        Names of the controllers.
-    every
-        Whether all were asked for, so that one that the case does not allow may be left out.
-    seeds, duration
-        Seeds of the runs, and their length [s].
-    design
-        Of the feedback, if given.
-    sample_time
-        Of the controllers [s]; None: their own.
-    how
-        How to simulate.
-    """
-
+    #: Case and operation.
     case: Case
     scenario: Scenario
-    controllers: tuple[str, ...]
+    controllers: tuple[str, ...]  #: Names of the controllers.
+    #: Whether all were asked for, so that one that the case does not allow may be left out.
     every: bool
+    #: Seeds of the runs, and their length [s].
     seeds: range
     duration: float
-    design: Design | None
-    sample_time: float | None
-    how: SimulationOptions
+    design: Design | None  #: Of the feedback, if given.
+    sample_time: float | None  #: Of the controllers [s]; None: their own.
+    how: SimulationOptions  #: How to simulate.
 
 
 def asked_of(arguments: argparse.Namespace) -> SimulationRequest:
