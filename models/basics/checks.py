@@ -55,23 +55,12 @@ def check_range(
     open_low: bool = False,
     open_high: bool = False,
 ) -> float:
-    """Return `value` as a float if it is finite and within the range.
+    """Return `value`, a number or a text that is one, as a float if finite and within the range.
 
-    Parameters
-    ----------
-    owner, name
-        What the value belongs to, and what it is called there.
-    value
-        The value that came: a number, or a text that is one.
-    low, high
-        Ends of the range [unit]; `open_low` and `open_high` exclude them.
-    unit
-        The unit that the message names.
+    `open_low` and `open_high` exclude the ends [unit]; the message calls the value `name` of
+    `owner`.
 
-    Raises
-    ------
-    InputError
-        If the value is not a finite number within the range.
+    Raises InputError if the value is not a finite number within the range.
     """
     try:
         number = float(value)  # type: ignore[arg-type]

@@ -132,21 +132,10 @@ def fractile_factor(t_z: float, probability: float, duration: float = THREE_HOUR
 
     .. math:: x_p = \sqrt{2 \ln N - 2 \ln \ln (1/p)},
 
-    which is the most probable maximum at p = 1/e = 0.37 (DNV-RP-C205 3.3.4).
+    which is the most probable maximum at p = 1/e = 0.37 (DNV-RP-C205 3.3.4).  The period T_z is
+    above zero [s], infinite for a signal at rest; p is between 0 and 1, T in s.
 
-    Parameters
-    ----------
-    t_z
-        Mean zero-crossing period [s], above zero; infinite for a signal at rest.
-    probability
-        p, between 0 and 1.
-    duration
-        Exposure time [s].
-
-    Raises
-    ------
-    InputError
-        If a figure is out of range.
+    Raises InputError if a figure is out of range.
 
     Examples
     --------

@@ -36,23 +36,11 @@ def plain(value: Any) -> Any:
 def replaced(
     tree: dict[str, Any], model: type[Section], changes: Mapping[str, Any], source: str
 ) -> dict[str, Any]:
-    """Return `tree` with the values of `changes` at their paths; `tree` is used up.
+    """Return `tree`, a section of a class `model` as plain data, with the `changes` in it.
 
-    Parameters
-    ----------
-    tree
-        A section as plain data, see `plain`.
-    model
-        The class of that section.
-    changes
-        New values by dotted path.
-    source
-        Name for the messages.
+    They are by dotted path; `tree` is used up.  Messages name the `source`.
 
-    Raises
-    ------
-    InputError
-        If paths are unknown; one line for each.
+    Raises InputError if paths are unknown; one line for each.
     """
     given = {tuple(part for part in re.split(r"[.\[\]]+", path) if part) for path in changes}
     wrong = []

@@ -74,18 +74,10 @@ def describe(
     source: str,
     lines: Mapping[Path, int] | None = None,
 ) -> str:
-    """Return one line per error, in the order of the file.
+    """Return one line per error that pydantic raised of a section class, in the order of the file.
 
-    Parameters
-    ----------
-    error
-        What pydantic raised.
-    model
-        The section class that was validated.
-    source
-        Name of the file, or of what takes its place.
-    lines
-        Line number of each path, where known.
+    The source is the name of the file, or of what takes its place; `lines` are those of each path,
+    where known.
     """
     found: list[tuple[int, str]] = []
     for entry in error.errors(include_url=False):

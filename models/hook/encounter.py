@@ -123,18 +123,10 @@ class Encounter(ReadOnlyArrays):
         rao: HeaveRao,
         splits: tuple[float, ...] = (),
     ) -> MetSpectrum:
-        """Return the spectrum of a motion as it is met.
+        """Return the spectrum of a motion as it is met, of the sea's density over its band [rad/s].
 
-        Parameters
-        ----------
-        density
-            The sea's density over the frequency of the waves.
-        band
-            Band of the sea [rad/s]; the spectrum that is met ends at its upper end too.
-        rao
-            Operator of the motion where it is one for all headings; else those of the hook count.
-        splits
-            Frequencies at which the density has a kink [rad/s].
+        It ends at the band's upper end too.  `rao` is the motion's operator where one holds for
+        all headings; else those of the hook count.  At `splits` the density has a kink [rad/s].
         """
         wave = self._waves(band, splits)
         middle = np.sqrt(wave[1:] * wave[:-1])

@@ -207,25 +207,14 @@ class HookMotion:
         )
 
     def record(self, duration: float, *, step: float = 0.05, seed: int) -> HookRecord:
-        """Draw a time series of the motion.
+        """Draw a time series of the motion from 0 to `duration` [s], every `step` [s].
 
         The same seed gives the same waves on every vessel, the same motion at every step that
-        divides ten seconds, and the same beginning at every duration up to 100 peak periods.
+        divides ten seconds, and the same beginning at every duration up to 100 peak periods.  The
+        samples are those of the continuous motion whatever the step: nothing of the band is lost or
+        folded.
 
-        Parameters
-        ----------
-        duration
-            Length [s]; the first and the last sample are at 0 and `duration`.
-        step
-            Time step [s].  The samples are those of the continuous motion whatever the step:
-            nothing of the band is lost or folded.
-        seed
-            Seed of the random numbers, not negative.
-
-        Raises
-        ------
-        InputError
-            If the duration is shorter than a step, or the seed is negative.
+        Raises InputError if the duration is shorter than a step, or the seed is negative.
         """
         check_range("hook record", "step", step, low=0.0, unit="s", open_low=True)
         check_range("hook record", "duration", duration, low=step, unit="s")

@@ -61,18 +61,10 @@ def seed_for(seed: int, *purpose: int) -> int:
 
 
 class LongRecord:
-    """The nodes of a random motion of any length, drawn when they are read.
+    """The nodes of a random motion of any duration [s], drawn when they are read.
 
-    Parameters
-    ----------
-    hook
-        The spectrum.
-    duration
-        Length [s].
-    step
-        Distance of the nodes [s]; divides five seconds.
-    seed
-        Seed of the first piece, from which those of the others follow.
+    Their distance `step` [s] divides five seconds; the seeds of later pieces follow from that of
+    the first.
     """
 
     last: int

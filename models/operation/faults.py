@@ -96,23 +96,13 @@ def fault_of(path: str) -> FaultField:
 def with_faults(
     scenario: Scenario, faults: Mapping[str, float], case: Case, duration: float
 ) -> Scenario:
-    """Return a scenario in which something fails.
+    """Return a scenario in which something fails, within the duration of the run [s].
 
-    Parameters
-    ----------
-    scenario
-        The operation.
-    faults
-        Sizes by path (``fault.delay_step``); a size that is no fault changes nothing.
-    case
-        The case that is simulated, for the drive's limits.
-    duration
-        Length of the run, in which the faults have to begin [s].
+    Faults are sizes by path (``fault.delay_step``); a size that is no fault changes nothing.  The
+    drive's limits are those of the case that is simulated.
 
-    Raises
-    ------
-    InputError
-        If a path is unknown, a size out of its range, or the faults begin after the run.
+    Raises InputError if a path is unknown, a size out of its range, or the faults begin after the
+    run.
 
     Examples
     --------

@@ -26,18 +26,9 @@ _ROWS_AT_ONCE = 16384
 def interpolated(
     nodes: Nodes, last_node: int, node_step: float, step: float
 ) -> Callable[[int, int], MotionBlock]:
-    """Return `Motion.evaluate` for a motion that is known at nodes.
+    """Return `Motion.evaluate`, a row each `step` [s], for a motion that is known at nodes.
 
-    Parameters
-    ----------
-    nodes
-        The nodes; node 0 is at time zero.
-    last_node
-        Index of the last node; no row lies beyond it.
-    node_step
-        Time between nodes [s].
-    step
-        Time between rows [s].
+    Node 0 is at time zero, the others `node_step` apart [s]; no row lies beyond the last.
     """
     ratio = node_step / step
     whole = round(ratio) if abs(ratio - round(ratio)) < 1e-9 * ratio else 0

@@ -253,19 +253,11 @@ def read_columns(
 ) -> dict[str, FloatArray]:
     """Read the columns of a text file by their names, in SI.
 
-    Parameters
-    ----------
-    path
-        The file.
-    kinds
-        Kind of quantity (`models.basics.units.KINDS`) of each column that is wanted.
-    required
-        Those that must be there.
+    `kinds` are those of quantities (`models.basics.units.KINDS`) by column; the required must be
+    there.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, lacks a column or holds what is no number; the line is named.
+    Raises InputError if the file cannot be read, lacks a column or holds what is no number; the
+    line is named.
     """
     rows = [
         (number, line)

@@ -186,21 +186,11 @@ def scenario_options(name: str) -> Mapping[str, Option | WordOption]:
 
 
 def scenario_named(name: str, case: Case, **options: object) -> Scenario:
-    """Return a scenario of the library.
+    """Return a scenario of the library, one of `scenario_names()`, with figures that fit a case.
 
-    Parameters
-    ----------
-    name
-        One of `scenario_names()`.
-    case
-        What its default figures follow from.
-    **options
-        Those of `scenario_options(name)`: numbers in SI, or texts with a unit such as `5 m`.
+    Options, of `scenario_options(name)`, are numbers in SI, or texts with a unit such as `5 m`.
 
-    Raises
-    ------
-    InputError
-        If there is no such scenario or option, or a value is out of range.
+    Raises InputError if there is no such scenario or option, or a value is out of range.
 
     Examples
     --------

@@ -33,16 +33,8 @@ def hermite_hold(
     """Return what a motion that is cubic over a sample has done to x at a time, and is there.
 
     x' = A x + E [z, z'], with z the cubic through (z0, z0') and (z1, z1'); the columns of both
-    results, (n, 4) and (2, 4) for z and z', belong to z0, z0', z1, z1'.
-
-    Parameters
-    ----------
-    A
-        (n, n) [1/s].
-    E
-        Columns of z and of z', (n, 2).
-    dt, at
-        Sample time, and the time since the sample's start [s].
+    results, (n, 4) and (2, 4) for z and z', belong to z0, z0', z1, z1'.  A is (n, n) [1/s], E (n,
+    2); the time `at` is that since the sample's start [s].
     """
     n, T = len(A), dt
     chain = np.zeros((n + 4, n + 4))

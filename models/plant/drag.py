@@ -32,26 +32,16 @@ def stochastic_equivalent(quadratic: float, sigma: float) -> float:
 def consistent_drag(
     quadratic: float, velocity_rms: Callable[[float], float], *, tolerance: float = 1e-10
 ) -> float:
-    """Return the C that agrees with the motion it leads to [N s/m].
+    """Return the C that agrees with the motion it leads to [N s/m], for q [N s2/m2].
 
-    Solves C = q sqrt(8/pi) sigma_v(C).  More drag means less motion, so that the difference of
-    both sides changes sign once: a bracketing root finder cannot settle on the wrong root,
-    as the usual substitution of C into its own equation can swing about it.
+    Solves C = q sqrt(8/pi) sigma_v(C).  More drag means less motion, so that the difference of both
+    sides changes sign once: a bracketing root finder cannot settle on the wrong root, as the usual
+    substitution of C into its own equation can swing about it.  `velocity_rms` leads from C to the
+    rms of the payload's velocity [m/s], infinite where there is no stationary motion; the tolerance
+    of C is relative.
 
-    Parameters
-    ----------
-    quadratic
-        q [N s2/m2].
-    velocity_rms
-        Function of C [N s/m] that returns the rms of the payload's velocity [m/s]; infinite
-        where there is no stationary motion.
-    tolerance
-        Relative tolerance of C [-].
-
-    Raises
-    ------
-    SolverError
-        If the motion does not shrink however large the drag: the plant is unstable with any.
+    Raises SolverError if the motion does not shrink however large the drag: the plant is unstable
+    with any.
     """
     if quadratic == 0.0:
         return 0.0
@@ -90,25 +80,12 @@ def settled_drag(
     """Return `consistent_drag` where the motion is an integral over frequencies.
 
     What costs is to find nodes for the integral; on given nodes a change of C costs next to
-    nothing.  So the equation is solved on the nodes that suit a first C, then on those that
-    suit its solution, until that no longer moves.
+    nothing.  So the equation is solved on the nodes that suit a first C, then on those that suit
+    its solution, until that no longer moves.  `about` leads from a C to the `velocity_rms` of
+    `consistent_drag` on nodes that suit it; it may raise SolverError where there are none (an
+    undamped motion).  A relative change of C below `settled` leaves the nodes as they are.
 
-    Parameters
-    ----------
-    quadratic
-        q [N s2/m2].
-    about
-        Function of a C [N s/m] that returns `velocity_rms` of `consistent_drag` on nodes that
-        suit this C; it may raise SolverError where there are none (an undamped motion).
-    start
-        The first C [N s/m].
-    settled
-        Relative change of C for which the nodes need not change.
-
-    Raises
-    ------
-    SolverError
-        If no C agrees with the motion it leads to, or none has nodes.
+    Raises SolverError if no C agrees with the motion it leads to, or none has nodes.
     """
     if quadratic == 0.0:
         return 0.0

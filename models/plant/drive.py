@@ -51,10 +51,7 @@ _UNITS = {
 class DriveLimits:
     """Limits of motor and inverter at the motor's shaft or terminals; infinite where none.
 
-    Raises
-    ------
-    InputError
-        If a limit is not above zero.
+    Raises InputError if a limit is not above zero.
     """
 
     torque: float = math.inf  #: Highest torque [N m].
@@ -113,15 +110,8 @@ def motor_equations(
 ) -> MotorEquations:
     """Return torque, current, derivative and the command applied, limits included.
 
-    Parameters
-    ----------
-    data
-        Which motor, and which of its states exist.
-    p, x
-        Parameters and states by name; limits are those parameters that exist.
-    command
-        What the controller asks for: armature voltage [V], speed reference [rad/s] or torque
-        [N m].
+    Parameters and states are by name; limits are those parameters that exist.  The command is an
+    armature voltage [V], a speed reference [rad/s] or a torque [N m].
     """
     speed = x["motor.speed"]
     window = _torque_window(p, speed)

@@ -36,19 +36,11 @@ if TYPE_CHECKING:
 
 
 def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
-    """Return the exact response of a case's plant at points of the complex plane.
+    """Return the exact response of a case's plant at points s (k,) [1/s], such as i omega.
 
-    Safe from overflow for any Re s >= 0: every hyperbolic function is carried as its product
-    with exp(-gamma).
-
-    Parameters
-    ----------
-    source
-        A case, or the plant's numbers.
-    s
-        Points [1/s], (k,), such as i omega; none of them a pole (s = 0 is one).
-    drag
-        Equivalent linear drag coefficient C of the payload [N s/m].
+    Safe from overflow for any Re s >= 0: every hyperbolic function is carried as its product with
+    exp(-gamma).  No point may be a pole (s = 0 is one).  The payload's equivalent linear drag is C
+    [N s/m].
     """
     data = as_plant_data(source)
     s = np.array(s, dtype=np.complex128).reshape(-1)
@@ -114,21 +106,12 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
 def rope_transfers(
     data: PlantData, s: ComplexArray, drag: float, *, spring: bool = False
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-    """Return P/Y, P/F, T_top/Y and T_top/F of the rope with its payload, each (k,).
+    """Return P/Y, P/F, T_top/Y and T_top/F of the rope with its payload, each (k,), at s [1/s].
 
     Y is the motion of the rope's upper end, or of the foot of a tip that gives; F a force on the
-    payload, T_top the tension at the drum, as deviations from rest.  By reciprocity T_top/F = -P/Y.
-
-    Parameters
-    ----------
-    data
-        The plant's numbers; rope and payload matter.
-    s
-        Points [1/s], (k,), Re s >= 0 for safety from overflow.
-    drag
-        Equivalent linear drag coefficient C of the payload [N s/m].
-    spring
-        Whether the rope is one spring with all of its mass below, as in the thesis.
+    payload, T_top the tension at the drum, as deviations from rest.  By reciprocity T_top/F =
+    -P/Y.  Drag is C [N s/m]; Re s >= 0 is safe from overflow.  As in the thesis the rope may be one
+    `spring`, with all of its mass below.
     """
     stiffness = data.rope_modulus(s)
     D, slings = data.payload_mass * s**2 + drag * s, 1.0 / data.sling_stiffness

@@ -52,11 +52,8 @@ _HAIR = 1e-8  # relative distance at which 1/(s - pole) leaves a closed loop eig
 class LinearPlant(ReadOnlyArrays):
     """A linear, time-invariant plant with named signals and delayed measurements.
 
-    Raises
-    ------
-    InputError
-        If shapes disagree, a number is not finite, a name is repeated or unknown, or a
-        delay is negative.
+    Raises InputError if shapes disagree, a number is not finite, a name is repeated or unknown, or
+    a delay is negative.
     """
 
     #: State matrices, (n, n), (n, nu), (n, nw).

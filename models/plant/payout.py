@@ -46,16 +46,10 @@ class DrumTravel:
         return cls(outward=outward, inward=inward)
 
     def haul(self, angle: ca.SX, radius: ca.SX, ratio: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Return (rope hauled in [m], radius in use [m]) at a motor angle.
+        """Return (rope hauled in [m], radius in use [m]) at a motor angle from rest [rad].
 
-        Parameters
-        ----------
-        angle
-            Motor angle from the static position [rad], positive hauling in.
-        radius
-            Radius at angle zero [m].
-        ratio
-            Turns of the motor per turn of the drum [-].
+        Hauling in is positive; the radius given is that at angle zero [m], the ratio turns of the
+        motor per turn of the drum.
         """
         turned = angle / ratio  # of the drum [rad]
         haul, in_use = radius * turned, radius

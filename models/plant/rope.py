@@ -121,14 +121,8 @@ class Link:
 def chain_of(p: Mapping[str, Any], lumps: RopeLumps, length: Any) -> list[Link]:
     """Return the chain of springs and masses of a plant's parameters, from the drum down.
 
-    Parameters
-    ----------
-    p
-        Parameters by name, as of `models.plant.equations.parameter_values`: numbers or symbols.
-    lumps
-        The rope's lumping.
-    length
-        Length of the rope [m]; ``rope.length`` unless it grows.
+    These are numbers or symbols by name, as of `models.plant.equations.parameter_values`; the
+    length [m] is ``rope.length`` unless it grows.
     """
     weight = p["payload.submerged_weight"]
     of_rope = p["rope.submerged_weight_per_length"] * p["rope.length"]

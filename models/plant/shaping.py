@@ -69,23 +69,11 @@ class ShapingFilter(ReadOnlyArrays):
 def fit_shaping_filter(
     density: Callable[[FloatArray], FloatArray], band: tuple[float, float], order: int = 8
 ) -> ShapingFilter:
-    """Return the filter that fits a one-sided density best.
+    """Return the filter of 4, 6 or 8 states that fits a one-sided density per rad/s best.
 
-    Parameters
-    ----------
-    density
-        One-sided variance density per rad/s at omega [rad/s], (k,) -> (k,).
-    band
-        Band that holds the variance [rad/s].
-    order
-        Number of states: 4, 6 or 8.
+    That leads from omega [rad/s], (k,), to (k,); the band holds the variance [rad/s].
 
-    Raises
-    ------
-    InputError
-        If the band holds no variance.
-    SolverError
-        If the fit does not converge.
+    Raises InputError if the band holds no variance; SolverError if the fit does not converge.
     """
     omega, width, target, variance = sampled_density("shaping filter", density, band, _NODES)
     low, high = band

@@ -219,16 +219,9 @@ class Surroundings:
         motions: Mapping[str, MotionSymbols],
         parameters: Mapping[str, ca.SX] | None = None,
     ) -> SurroundingForces:
-        """Return the forces as expressions.
+        """Return the forces as expressions of the payload's P [m], P' [m/s] and :attr:`motions`.
 
-        Parameters
-        ----------
-        displacement, velocity
-            P [m] and P' [m/s] of the payload.
-        motions
-            Displacement, velocity and acceleration of each of :attr:`motions`.
-        parameters
-            Symbols that stand for some of :attr:`parameters`; the others become constants.
+        Those of :attr:`parameters` that have no symbols become constants.
         """
         p: dict[str, ca.SX] = {name: ca.SX(value) for name, value in self.parameters.items()}
         p |= parameters or {}

@@ -60,25 +60,12 @@ def gumbel_maximum(
     repetitions: int = 4000,
     seed: int = 0,
 ) -> ExtremeEstimate:
-    """Return the most probable maximum by Gumbel's law.
+    """Return the most probable maximum in a duration T [s] by Gumbel's law.
 
-    Parameters
-    ----------
-    maxima
-        Independent maxima (n,), each of a block of equal length.
-    block
-        Length of the blocks [s].
-    duration
-        Time T [s]; much beyond n blocks it is extrapolation, and the interval says so.
-    confidence
-        Of the interval.
-    repetitions, seed
-        Samples drawn for the interval, and their seed.
+    The maxima (n,) are independent, each of a block of so many seconds.  Much beyond n blocks T is
+    extrapolation, and the interval says so; it comes from `repetitions` samples.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than `FEWEST_MAXIMA`, or all are equal.
+    Raises InputError if there are fewer than `FEWEST_MAXIMA`, or all are equal.
     """
     x = check_finite("extremes", "maxima", maxima).ravel()
     if x.size < FEWEST_MAXIMA:
@@ -118,31 +105,13 @@ def extreme_over_seeds(
     confidence: float = 0.95,
     seed: int = 0,
 ) -> ExtremeEstimate:
-    """Return the most probable maximum of a signal from runs that differ in their seed alone.
+    """Return the most probable maximum, or minimum, of a signal in T [s] from runs over seeds.
 
-    Parameters
-    ----------
-    runs
-        The runs, or their statistics.
-    signal
-        The signal; it must have block extremes, see `Accumulator`.
-    minimum
-        The most probable minimum instead.
-    duration
-        Time T [s].
-    confidence, seed
-        Of the interval; the seed of its random numbers.
+    The signal must have block extremes, see `Accumulator`; T is in s, the seed that of the
+    interval.  The Rayleigh estimate is beside it if the signal has cycles.  Where the data are too
+    few its values are NaN and its status says why.
 
-    Returns
-    -------
-    ExtremeEstimate
-        With the Rayleigh estimate beside it if the signal has cycles.  Where the data are too few
-        its values are NaN and its status says why.
-
-    Raises
-    ------
-    InputError
-        If there are no runs, or no such signal, or no block extremes were kept of it.
+    Raises InputError if there are no runs, or no such signal, or no block extremes were kept of it.
     """
     found = [run if isinstance(run, Statistics) else run.statistics for run in runs]
     if not found:

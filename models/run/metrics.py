@@ -54,21 +54,12 @@ class Summary:
         held: Sequence[Run | Statistics] | None = None,
         confidence: float = 0.95,
     ) -> Summary:
-        """Return the summary of runs that differ in their seed alone.
+        """Return the summary of runs, or of their statistics, that differ in their seed alone.
 
-        Parameters
-        ----------
-        runs
-            The runs, or their statistics; at least one.
-        held
-            The same seeds with the drum held, in the same order: adds the residual against them.
-        confidence
-            Of the intervals, between 0 and 1.
+        `held` are the same seeds with the drum held, in the same order: adds the residual against
+        them.
 
-        Raises
-        ------
-        InputError
-            If there is no run, or those with the drum held are not as many.
+        Raises InputError if there is no run, or those with the drum held are not as many.
         """
         if not runs:
             raise InputError("summary of runs: at least one run is wanted, got none")

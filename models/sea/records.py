@@ -84,16 +84,7 @@ class SeaRecords:
     ) -> SeaRecords:
         """Return records from arrays, through the same quality control as a file's.
 
-        Parameters
-        ----------
-        frequency
-            Frequencies, strictly ascending (k,) [Hz].
-        density
-            Variance densities (n, k) [m^2/Hz].
-        time
-            Times, UTC (n,).
-        source
-            Name for the messages.
+        Frequencies ascend strictly (k,) [Hz]; densities are (n, k) [m^2/Hz], times UTC (n,).
         """
         table = np.atleast_2d(np.asarray(density, dtype=np.float64))
         when = np.full(len(table), "NaT") if time is None else np.asarray(time)

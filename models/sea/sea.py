@@ -80,10 +80,7 @@ _GAUSSIAN_END = 12.0  # standard deviations: exp(-72)
 class SeaSpectrum:
     """A sea state by its spectrum.
 
-    Raises
-    ------
-    InputError
-        If a value is out of range, or a field is missing or is not for the kind.
+    Raises InputError if a value is out of range, or a field is missing or is not for the kind.
 
     Examples
     --------

@@ -88,19 +88,11 @@ def thesis_density(omega: FloatArray, height: float, significant_period: float) 
 def library_density(
     kind: str, omega: FloatArray, height: float, period: float, *, gamma: float, order: float
 ) -> FloatArray:
-    """Return a spectrum of the library `waveresponse` [m^2 s/rad].
+    """Return a spectrum of `waveresponse` [m^2 s/rad] at frequencies above zero (k,) [rad/s].
 
-    Parameters
-    ----------
-    kind
-        A standard form.  Pierson and Moskowitz's is Bretschneider's with a period of its own, and
-        TMA's is JONSWAP's before the depth comes in.
-    omega
-        Frequencies above zero, any order (k,) [rad/s].
-    height, period
-        H_s [m] and T_p [s].
-    gamma, order
-        Peak enhancement of `jonswap` and `tma`, q of `ochi-hubble` [-].
+    Pierson and Moskowitz's is Bretschneider's with a period of its own, and TMA's is JONSWAP's
+    before the depth comes in.  Heights are H_s [m], periods T_p [s]; `gamma` is the peak
+    enhancement of `jonswap` and `tma`, `order` the q of `ochi-hubble` [-].
     """
     import waveresponse  # here, because it loads pandas and more: 0.7 s
 
@@ -136,16 +128,9 @@ def depth_function(omega: FloatArray, depth: float) -> FloatArray:
 
 
 def gaussian_density(omega: FloatArray, height: float, peak: float, width: float) -> FloatArray:
-    """Return a swell whose energy is normally distributed over frequency [m^2 s/rad].
+    """Return a swell of H_s [m] whose energy is normally distributed over frequency [m^2 s/rad].
 
-    Parameters
-    ----------
-    omega
-        Frequencies [rad/s].
-    height
-        H_s [m].
-    peak, width
-        Mean and standard deviation of the frequency [rad/s].
+    Its mean is `peak`, its standard deviation `width` [rad/s].
     """
     z = (omega - peak) / width
     result: FloatArray = (

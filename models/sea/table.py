@@ -30,10 +30,8 @@ _TAIL_END = 60.0
 class SpectrumTable:
     """Variance densities at frequencies.
 
-    Raises
-    ------
-    InputError
-        If the table is unsorted, too short or too long, holds a negative or no number, or nothing.
+    Raises InputError if the table is unsorted, too short or too long, holds a negative or no
+    number, or nothing.
 
     Examples
     --------

@@ -27,23 +27,8 @@ def draw(
 ) -> FloatArray:
     """Return rows `start` to `start + count` of an endless table of independent numbers.
 
-    Parameters
-    ----------
-    seed
-        Seed of the run, not negative.
-    purpose
-        What the numbers are for; each purpose has a table of its own.
-    start, count
-        First row, not negative, and number of rows.
-    columns
-        Width of the table.
-    law
-        ``normal``: mean 0 and variance 1; ``uniform``: in [0, 1).
-
-    Returns
-    -------
-    ndarray
-        (count, columns).
+    Each seed and purpose has a table of its own.  A ``normal`` number has mean 0 and variance 1, a
+    ``uniform`` one is in [0, 1).
     """
     table = np.empty((count, columns))
     for block in range(start // _BLOCK, -(-(start + count) // _BLOCK)):

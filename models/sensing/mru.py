@@ -108,16 +108,7 @@ class ErrorProcess:
     ) -> tuple[FloatArray, complex]:
         """Return the errors of heave and rate at n samples (n, 2), and the mode at the last.
 
-        Parameters
-        ----------
-        mode
-            That at the sample before, or at sample 0.
-        seed
-            Seed of the run.
-        step
-            Time between samples [s].
-        start, n
-            First sample, and how many.
+        The mode given is that at the sample before, or at sample 0; samples are `step` apart [s].
         """
         pole = low_pass_pole(self.corner)
         _, added = low_pass_noise(self.corner, step)
@@ -379,18 +370,9 @@ def error_density(
 ) -> FloatArray:
     """Return the one-sided density of the heave's error [m2 s/rad] before the unit's delay.
 
-    Gain and phase error are in it with their root mean square over both signs.
-
-    Parameters
-    ----------
-    unit
-        The unit; None for a perfect one.
-    omega
-        Frequencies [rad/s], (n,).
-    heave
-        Density of the hook's heave there [m2 s/rad], (.., n).
-    heave_rms
-        Standard deviation of the heave [m], (.., 1) or a number.
+    Gain and phase error are in it with their root mean square over both signs.  Without a unit it
+    is a perfect one.  The heave's own density at the frequencies (n,) [rad/s] is (.., n) [m2
+    s/rad], its standard deviation (.., 1) or a number [m].
     """
     unit = unit or PERFECT
     found = np.zeros_like(heave)
@@ -460,22 +442,10 @@ def mode_recursion(factor: complex, first: complex, drive: ComplexArray) -> Comp
 
 
 def low_pass_noise(corner: float, step: float, rms: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Return what becomes of white noise behind the low-pass over a time step.
+    """Return what becomes of white noise behind the low-pass, a corner in rad/s, over a step [s].
 
-    Parameters
-    ----------
-    corner
-        Corner frequency [rad/s].
-    step
-        Time step [s].
-    rms
-        Of the value, in all.
-
-    Returns
-    -------
-    over, added
-        Value and derivative after the step by those before it, (2, 2), and the covariance of what
-        they gain, (2, 2).
+    It is the value and derivative after the step by those before it, (2, 2), and the covariance of
+    what they gain, (2, 2), for so much rms of the value in all.
     """
     over, added = noisy_hold(low_pass(corner), np.array([[0.0], [1.0]]), step)
     # Variance of the value under white noise of intensity one: 1/(2 sqrt(2) corner^3).

@@ -154,23 +154,10 @@ def with_loads(plant: LinearPlant, data: PlantData) -> LinearPlant:
 
 
 def with_sensors(plant: LinearPlant, sensors: Sensors | None, command_delay: float) -> LinearPlant:
-    """Return a linear plant of `models.plant.plant` with the sensors besides the payload's own.
+    """Return a plant of `Plant.linearise` with the other sensors too; None stands for exact ones.
 
-    Every matrix of the answer is affine in those of `plant`.
-
-    Parameters
-    ----------
-    plant
-        The plant, as `Plant.linearise` gives it.
-    sensors
-        The sensors of a case; None for exact ones.
-    command_delay
-        Delay from the command to the drive [s], which every measurement carries.
-
-    Returns
-    -------
-    LinearPlant
-        As `sensed_plant` describes it.
+    Every matrix of the answer is affine in those of `plant`.  Every measurement carries the delay
+    from the command to the drive [s].
     """
     sensors = sensors or Sensors()
     unit, cell = sensors.mru or PERFECT, sensors.load_cell
@@ -302,25 +289,11 @@ def sensed_line_at(
     friction: float = 0.0,
     data: PlantData | None = None,
 ) -> PlantResponse:
-    """Return the exact response of a case's rope, drive and sensors, delays and all.
+    """Return the exact response of a case's rope, drive and sensors at points s (k,) [1/s].
 
-    Parameters
-    ----------
-    case
-        The case.
-    s
-        Points [1/s], (k,), none of them a pole (s = 0 is one).
-    drag
-        Equivalent linear drag coefficient of the payload [N s/m].
-    friction
-        Viscous friction at the motor beside its own, that of losses which switch [N m s/rad].
-    data
-        The case's numbers, where they are at hand.
-
-    Returns
-    -------
-    PlantResponse
-        With the names of `sensed_plant`, on the distributed rope (`models.plant.line_response`).
+    No point is a pole (s = 0 is one).  The payload's equivalent linear drag is in N s/m, the
+    friction that of losses which switch, beside the motor's own [N m s/rad].  Names are those of
+    `sensed_plant`, the rope `models.plant.line_response`.
     """
     data = PlantData.from_case(case) if data is None else data
     loaded = replace(data, viscous_friction=data.viscous_friction + friction)

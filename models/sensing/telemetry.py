@@ -246,16 +246,9 @@ def check_intervals(
 
 
 def during(intervals: Sequence[Interval], samples: IntArray, sample_time: float) -> BoolArray:
-    """Return which samples lie within one of the intervals, start included, end not.
+    """Return which samples k (n,), at k `sample_time` [s], lie in an interval (start, end) [s].
 
-    Parameters
-    ----------
-    intervals
-        Pairs (start, end) [s].
-    samples
-        Numbers k of samples at k `sample_time` (n,).
-    sample_time
-        Time between samples [s].
+    The start is included, the end not.
     """
     inside = np.zeros(len(samples), dtype=np.bool_)
     for start, end in intervals:

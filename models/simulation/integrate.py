@@ -57,19 +57,10 @@ def rk4_step(
     motions1: Driven,
     h: float,
 ) -> Value:
-    """Return the state after one step of the classical Runge-Kutta method.
+    """Return the state x after one step h [s] of the classical Runge-Kutta method.
 
-    Parameters
-    ----------
-    rhs
-        (x, motions) -> x'; whatever else it needs is held over the step.
-    x
-        State at the beginning.
-    motions0, motions_mid, motions1
-        What moves the plant (displacement and velocity of every motion, say) at the beginning,
-        in the middle (`hermite_midpoint`) and at the end.
-    h
-        Length of the step [s].
+    x' is rhs(x, motions).  What moves the plant (displacement and velocity of every motion, say) is
+    given at the beginning, in the middle (`hermite_midpoint`) and at the end; all else is held.
     """
     k1 = rhs(x, motions0)
     k2 = rhs(x + (0.5 * h) * k1, motions_mid)
@@ -79,24 +70,11 @@ def rk4_step(
 
 
 def braked_step(plant: Plant, parameters: Sequence[str], motions: int, step: float) -> ca.Function:
-    """Return a step of the plant with the drum's brake as a function.
+    """Return a step [s] of the plant with the drum's brake: (x, u, ends, brake, p) -> x.
 
-    Parameters
-    ----------
-    plant
-        The plant, whose parameters come first among `parameters`.
-    parameters
-        Names of p; ``brake.torque`` [N m] is among them.
-    motions
-        How many motions there are, the hook's included.
-    step
-        Length of the step [s].
-
-    Returns
-    -------
-    casadi.Function
-        (x, u, ends, brake, p) -> x, with `ends` displacement, velocity and acceleration of every
-        motion at the beginning, then at the end, (6 motions,), and `brake` in [0, 1].
+    `ends` are displacement, velocity and acceleration of every motion, the hook's included, at the
+    beginning, then at the end, (6 motions,), `brake` is in [0, 1], and p has the plant's parameters
+    first and ``brake.torque`` [N m] among the others.
     """
     x, u = ca.SX.sym("x", len(plant.states)), ca.SX.sym("u")
     ends, brake = ca.SX.sym("ends", 6 * motions), ca.SX.sym("brake")
@@ -172,26 +150,14 @@ def choose_step(
     *,
     extra_rates: Sequence[float] = (),
 ) -> StepChoice:
-    """Return the integration step: the longest allowed that divides the sample, or `step`.
+    """Return the integration step [s]: the longest allowed that divides the sample, or `step`.
 
-    A step is allowed if no eigenvalue lambda has h |lambda| above one.
+    A step is allowed if no eigenvalue lambda has h |lambda| above one.  The plant's Jacobian is (n,
+    n) [1/s], or several (k, n, n), such as over rope lengths.  Rates [rad/s] that it does not show
+    are extra: friction about zero speed, the stiffness of a contact.
 
-    Parameters
-    ----------
-    A
-        Jacobian of the plant (n, n) [1/s], or several (k, n, n), such as over rope lengths.
-    sample_time
-        Control sample [s].
-    step
-        The step that is asked for [s]; it must divide the sample.
-    extra_rates
-        Further rates [rad/s] that the Jacobians do not show: friction about zero speed, the
-        stiffness of a contact.
-
-    Raises
-    ------
-    InputError
-        If `step` is too long or does not divide the sample, or the sample takes too many.
+    Raises InputError if `step` is too long or does not divide the sample, or the sample takes too
+    many.
 
     Notes
     -----

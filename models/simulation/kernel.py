@@ -104,28 +104,13 @@ class Kernel:
     def run(
         self, state: npt.ArrayLike, rows: npt.ArrayLike, parameters: npt.ArrayLike
     ) -> tuple[FloatArray, FloatArray]:
-        """Run the recursion over rows, one after the other.
+        """Run the recursion over rows r (n, nr), n may be zero, one after the other, from s (ns,).
 
-        Parameters
-        ----------
-        state
-            s before the first row, (ns,).
-        rows
-            r of each sample, (n, nr), n may be zero.
-        parameters
-            p, (np,), the same for all rows.
+        p (np,) is the same for all rows.  The state after the last comes back, and what came out at
+        each row (n, nout), new arrays.
 
-        Returns
-        -------
-        state, out : ndarray
-            s after the last row, (ns,), and what came out at each row, (n, nout), new arrays.
-
-        Raises
-        ------
-        InputError
-            If a shape is wrong.
-        SolverError
-            If the function itself reports that it failed.
+        Raises InputError if a shape is wrong; SolverError if the function itself reports that it
+        failed.
 
         Notes
         -----

@@ -80,16 +80,9 @@ class RowMaker:
         return found[0], found[1]
 
     def trip(self, rows: FloatArray, first: int, since: float) -> None:
-        """Write into rows that the brake closes at a time [s] and the controller is let go.
+        """Write into rows of `block` that the brake closes at a time [s] and the command ends.
 
-        Parameters
-        ----------
-        rows
-            Rows from `block`, changed in place.
-        first
-            Number of the first sample in them.
-        since
-            When it happened [s].
+        `first` is the number of the first sample in them.
         """
         time = self.schedule.sample_time * np.arange(first, first + len(rows)) - since
         closed = np.clip(time / self.closing_time, 0.0, 1.0) if self.closing_time else time >= 0.0

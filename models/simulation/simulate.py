@@ -42,28 +42,12 @@ Ran = tuple[FloatArray, FloatArray, Event | None]
 def run_simulation(
     simulation: Simulation, *, seed: int = 0, progress: Progress | None = None
 ) -> Run:
-    """Run a prepared simulation once.
+    """Run a prepared simulation once, also one that diverges or is interrupted.
 
-    Parameters
-    ----------
-    simulation
-        The simulation.
-    seed
-        Seed of the sea, the noise and the telemetry, not negative.
-    progress
-        Called now and then with the share that is done.
+    The seed is that of sea, noise and telemetry; `progress` is called now and then with the share
+    that is done.
 
-    Returns
-    -------
-    Run
-        Also of a run that diverged or was interrupted; its status says so.
-
-    Raises
-    ------
-    InputError
-        If an option is out of range.
-    SolverError
-        If the controller's recursion fails.
+    Raises InputError if an option is out of range; SolverError if the controller's recursion fails.
     """
     began = clock.perf_counter()
     if simulation.scenario.worst_trip is not None:
@@ -183,17 +167,7 @@ class _Stepper:
     def run(self, state: FloatArray, rows: FloatArray, parameters: FloatArray, first: int) -> Ran:
         """Run over rows, to their end or to the first trip, whose row is the last of the log.
 
-        Parameters
-        ----------
-        state, rows, parameters
-            As for `Kernel.run`.
-        first
-            Number of the first sample.
-
-        Returns
-        -------
-        state, log, trip
-            The state after the last row of the log, the log, and the trip if there was one.
+        `first` is the number of the first sample, the rest as for `Kernel.run`.
         """
         (kernel,) = self._kernels
         after, log = kernel.run(state, rows, parameters)

@@ -57,16 +57,9 @@ def trip_limits(case: Case) -> tuple[TripLimit, ...]:
 
 
 class Watch:
-    """The ranges of some signals, watched in the log of a run.
+    """The ranges of some signals, watched in the log of a run whose columns are `signals`.
 
-    Parameters
-    ----------
-    limits
-        The ranges; of signals that the log does not have nothing is known.
-    signals
-        Names of the log's columns.
-    sample_time
-        Time between samples [s].
+    Of signals that the log does not have nothing is known.
     """
 
     def __init__(

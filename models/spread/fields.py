@@ -63,23 +63,11 @@ class Field:
 
 
 def field_of(case: Case, name: str, gains: Mapping[str, float], drag: float | None) -> Field:
-    """Return the field of a name.
+    """Return the field of a dotted path, an alias, ``gains.`` and a gain's name, or ``drag``.
 
-    Parameters
-    ----------
-    case
-        The case.
-    name
-        A dotted path, an alias, ``gains.`` and the name of a gain, or ``drag``.
-    gains
-        The design's gains by name.
-    drag
-        The design's linear drag coefficient [N s/m], None if there is no design.
+    The design's linear drag coefficient is in N s/m, None if there is no design.
 
-    Raises
-    ------
-    InputError
-        If there is no number of that name.
+    Raises InputError if there is no number of that name.
     """
     path = ALIASES.get(name, name)
     if path == DRAG:

@@ -51,10 +51,7 @@ _LEAD = {"crest": 0.0, "trough": -math.pi, "zero up-crossing": 0.5 * math.pi,
 class Convention:
     """What the numbers of a RAO file mean; the defaults are the project's own convention.
 
-    Raises
-    ------
-    InputError
-        If a field is none of its :data:`CHOICES`.
+    Raises InputError if a field is none of its :data:`CHOICES`.
 
     Examples
     --------

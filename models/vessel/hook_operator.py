@@ -108,32 +108,15 @@ def sea_directions(heading: float, spreading: Spreading | None) -> tuple[FloatAr
 def heave_operators(
     raos: VesselRaos, point: Point, headings: FloatArray, *, smooth: bool = False
 ) -> ComplexArray:
-    """Return the heave of a point per wave elevation at that point.
+    """Return the heave of a point (3,) [m] per wave elevation there (k, n) [m/m].
 
-    Between two headings of the table the six motions are interpolated about the table's own
-    origin, where they change slowly with the heading, and then taken to the point: the wave's
-    phase between the two places, k d cos b, would turn by a radian from one heading to the next.
+    Between two headings of the table the six motions are interpolated about the table's own origin,
+    where they change slowly with the heading, and then taken to the point: the wave's phase between
+    the two places, k d cos b, would turn by a radian from one heading to the next.  Waves travel to
+    the headings (n,) [rad]; if `smooth` a spline joins them where lines do, see
+    :meth:`VesselRaos.response`.
 
-    Parameters
-    ----------
-    raos
-        The vessel.
-    point
-        The point, in the frame of `raos` (3,) [m].
-    headings
-        Where the waves travel to (n,) [rad].
-    smooth
-        Whether a spline joins the headings where lines do, see :meth:`VesselRaos.response`.
-
-    Returns
-    -------
-    ComplexArray
-        Operators at the rows of `raos` (k, n) [m/m].
-
-    Raises
-    ------
-    InputError
-        If the vessel has not been computed near a heading.
+    Raises InputError if the vessel has not been computed near a heading.
     """
     motions = raos.response(raos.omega[:, None], headings, smooth=smooth)
     x, y = point[0] - raos.origin[0], point[1] - raos.origin[1]

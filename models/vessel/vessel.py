@@ -64,11 +64,8 @@ class HeaveRao:
     Time factor e^{+i omega t}, heave positive up, against a wave elevation that has zero phase at
     the RAO's origin.
 
-    Raises
-    ------
-    InputError
-        If the table is unsorted, has unequal lengths or fewer than two rows, or a value is
-        negative, NaN or unknown.
+    Raises InputError if the table is unsorted, has unequal lengths or fewer than two rows, or a
+    value is negative, NaN or unknown.
 
     Examples
     --------

@@ -156,23 +156,9 @@ def record_plant(
 ) -> RecordPlant:
     """Return the sampled plant of a case, its rope as `PlantData.viscous`.
 
-    Parameters
-    ----------
-    case
-        The case.
-    sample_time
-        [s].
-    drag
-        Linear drag coefficient of the payload [N s/m].
-    masses, limits
-        Rope masses and drive limits; by default the case's.
-    hold
-        What is held over a sample.
+    Times are in s, the payload's linear drag coefficient in N s/m.
 
-    Raises
-    ------
-    InputError
-        If the drive has no finite peak torque or cannot hold the load.
+    Raises InputError if the drive has no finite peak torque or cannot hold the load.
     """
     limits = DriveLimits.from_case(case) if limits is None else limits
     plant = build_plant(PlantData.from_case(case).viscous, masses)

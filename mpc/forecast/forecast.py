@@ -62,21 +62,9 @@ class Predictor(Protocol):
 
 
 def leads_of(owner: str, sample_time: float, horizon: float) -> FloatArray:
-    """Return the leads 0, Ts, 2 Ts .. horizon [s], read-only.
+    """Return the leads 0, Ts, 2 Ts .. horizon [s], read-only; the horizon is rounded to samples.
 
-    Parameters
-    ----------
-    owner
-        Who asks, for the messages.
-    sample_time
-        Spacing [s].
-    horizon
-        Last lead [s], rounded to samples.
-
-    Raises
-    ------
-    InputError
-        If one is out of its range, or the horizon is longer than 100 000 samples.
+    Raises InputError if one is out of its range, or the horizon is longer than 100 000 samples.
     """
     step = check_range(owner, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
     last = check_range(owner, "horizon", horizon, low=0.0, high=_MOST_LEADS * step, unit="s")

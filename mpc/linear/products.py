@@ -51,19 +51,11 @@ class Products:
         covariance: FloatArray | None,
         believed: PredictionModel,
     ) -> Products:
-        """Return the products of a programme.
+        """Return the products of a programme on a model, within deviations of each watched signal.
 
-        Parameters
-        ----------
-        model, programme
-            Model and matrices.
-        limits
-            Lowest and highest deviation of each watched signal.
-        covariance
-            None where the hook's path is that of the model's own sea; where it comes with each
-            step, the covariance of the sea's estimate, (nh, nh).
-        believed
-            The estimator's model, whose A it is.
+        The covariance is None where the hook's path is that of the model's own sea; where it comes
+        with each step, that of the sea's estimate, (nh, nh), whose A is that of the model
+        `believed`.
         """
         p, h, winch, nb = programme, programme.horizon, model.winch, len(programme.blocks)
         # A violation of one per cent is to cost the same whatever is limited: rows in units of

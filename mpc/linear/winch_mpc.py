@@ -339,19 +339,7 @@ def _predictor(
 
 
 class DriveWindow:
-    """Bounds on the moves, in units of a torque.
-
-    Parameters
-    ----------
-    winch
-        The sampled winch.
-    limits
-        Limits of the drive.
-    moves
-        How many there are.
-    unit
-        Torque of a move of one [N m].
-    """
+    """Bounds on so many moves, in units of a torque [N m], by the limits of a drive."""
 
     def __init__(self, winch: SampledWinch, limits: DriveLimits, moves: int, unit: float) -> None:
         self._winch, self._unit = winch, unit
@@ -370,21 +358,13 @@ class DriveWindow:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and the highest value of each move.
 
-        A move is the torque at the start of a sample, from which a held command lets it fall as
-        the drum gets faster.  A drive that is asked for more holds its peak to the end of the
-        sample: the peak is then the mean, and the move that stands for it half the fall higher.
-
-        Parameters
-        ----------
-        speed
-            Motor speed now [rad/s].
-        speeds
-            Motor speed at the start of each move, by the last plan [rad/s], (n,).
-        cap
-            Highest torque for now, such as that of the thermal budget [N m].
-        changes
-            Change of speed over the first sample of each move, by the last plan [rad/s], (n,);
-            None to keep the torque at the start of a sample within the peak.
+        A move is the torque at the start of a sample, from which a held command lets it fall as the
+        drum gets faster.  A drive that is asked for more holds its peak to the end of the sample:
+        the peak is then the mean, and the move that stands for it half the fall higher.  Motor
+        speeds are that now, and those at the start of each move, by the last plan [rad/s], (n,);
+        `cap` is the highest torque for now, such as that of the thermal budget [N m].  Without
+        `changes` of speed over the first sample of each move (n,), by the last plan, the torque at
+        the start of a sample stays within the peak.
         """
         low, high = self._low, self._high
         rest, unit = self._winch.rest_torque, self._unit

@@ -32,18 +32,9 @@ def winch_programme(
     blocks: Sequence[int],
     watch: Sequence[str] = ("speed", "tension"),
 ) -> Condensed:
-    """Return the matrices of the programme.
+    """Return the matrices of the programme, with blocks of so many samples (nb,).
 
-    Parameters
-    ----------
-    model
-        The prediction model.
-    regulator
-        The regulator, whose value function ends the horizon.
-    blocks
-        Length of each block in samples, (nb,).
-    watch
-        Signals that get rows: of `WATCHED`.
+    The regulator's value function ends the horizon; signals of `WATCHED` get rows.
     """
     winch = model.winch
     horizon = Horizon(

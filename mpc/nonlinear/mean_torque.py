@@ -79,16 +79,8 @@ def start_torque(mean: float, drift: float, peak: float) -> float:
     """Return the demand at the start of a sample that gives a mean torque, cut at the peak [N m].
 
     The demand is taken to fall evenly, from s to s - 2 drift; what lies beyond the peak is cut, and
-    s is raised until the rest has the mean that is wanted.
-
-    Parameters
-    ----------
-    mean
-        Mean torque [N m]; cut to the peak.
-    drift
-        Start over mean without a limit [N m].
-    peak
-        What the drive gives at most, either way [N m].
+    s is raised until the rest has the mean that is wanted.  The mean is cut to the peak, what the
+    drive gives at most, either way; the drift is that of start over mean without a limit [N m].
     """
     mean = min(max(mean, -peak), peak)
     half = abs(drift)

@@ -88,22 +88,10 @@ def make_stage(
 ) -> Stage:
     """Return one sample of a winch with what is nonlinear in it.
 
-    Parameters
-    ----------
-    winch
-        The sampled winch.
-    law
-        Its forces.
-    mean
-        Whether the input is the mean torque of a sample (`mpc.nonlinear.mean_torque`), else that at
-        its start.
-    compiled
-        As for `models.simulation.kernel.Kernel`.
+    The input is the `mean` torque of a sample (`mpc.nonlinear.mean_torque`), else that at its
+    start.
 
-    Raises
-    ------
-    SolverError
-        If C was demanded and there is no compiler.
+    Raises SolverError if C was demanded and there is no compiler.
     """
     y = ca.SX.sym("y", len(law.arguments))
     n = law.function(y)
@@ -177,23 +165,12 @@ def force_law(
     slack: Sequence[int] | None = None,
     travel: DrumTravel | None = None,
 ) -> ForceLaw:
-    """Return the forces of a winch.
+    """Return the forces of a winch: quadratic drag, slack of springs, layers of the drum.
 
-    Parameters
-    ----------
-    winch
-        The sampled winch.
-    drag
-        Whether the payload's drag is quadratic.
-    slack
-        Springs, counted from the drum, that can go slack; by default the first and the last.
-    travel
-        Layers of the drum; by default its radius does not change.
+    Springs that can go slack are counted from the drum, by default the first and the last; without
+    `travel` the drum's radius does not change.
 
-    Raises
-    ------
-    InputError
-        If there is no such spring.
+    Raises InputError if there is no such spring.
     """
     data, rope = winch.data, _Rope(winch)
     last = len(rope.hanging) - 1

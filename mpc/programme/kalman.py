@@ -38,14 +38,8 @@ def kalman_gain(
 ) -> FloatArray:
     """Return the gain of the measurements that are there, (n, ny); zero columns of the others.
 
-    Parameters
-    ----------
-    C, R
-        Rows and variances of the measurements, (ny, n), (ny,).
-    P
-        Covariance of the prediction, (n, n).
-    there
-        (ny,); all by default.
+    Their rows C are (ny, n), variances R (ny,), the prediction's covariance P (n, n); `there` is
+    (ny,), all by default.
     """
     gain = np.zeros((len(P), len(R)))
     there = np.ones(len(R), dtype=np.bool_) if there is None else there

@@ -141,16 +141,8 @@ def kkt_residual(
     """Return the largest violation of the optimality conditions, by other arithmetic.
 
     Stationarity over the size of the gradient; violation of the bounds on moves; soft rows: a
-    multiplier must be zero inside, and w + W s where the row is violated by s; signs.
-
-    Parameters
-    ----------
-    qp
-        The programme.
-    f, lower, upper
-        As given to `SoftQP.solve`.
-    solved
-        The answer.
+    multiplier must be zero inside, and w + W s where the row is violated by s; signs.  f, lower and
+    upper are those given to `SoftQP.solve`.
     """
     v, lam = solved.v, solved.multipliers
     G = np.vstack([np.eye(len(f)), qp.hard, qp.rows])

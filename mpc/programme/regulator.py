@@ -60,21 +60,13 @@ def lq_regulator(
     Phi: FloatArray,
     steady: FloatArray,
 ) -> LQRegulator:
-    """Return the regulator of a plant.
+    """Return the regulator of a plant: A (nx, nx), B (nx, 1), and the row q, (nx,), of its output.
 
-    Parameters
-    ----------
-    A, B, output
-        (nx, nx), (nx, 1), and the row q, (nx,).
-    weight, Gamma, Phi, steady
-        As for `LQRegulator`.
-    scale
-        Size of each state, for the numerics of the Riccati equation, (nx,).
+    `weight`, `Gamma`, `Phi` and `steady` are as for `LQRegulator`; for the numerics of the Riccati
+    equation `scale` is the size of each state, (nx,).
 
-    Raises
-    ------
-    SolverError
-        If the Riccati equation has no solution, or the regulated plant is not stable.
+    Raises SolverError if the Riccati equation has no solution, or the regulated plant is not
+    stable.
     """
     # Each state in its own size, and the weight in B, so that an input of one costs one.
     scaled = output * scale

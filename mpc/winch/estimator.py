@@ -39,24 +39,7 @@ _LATER = 1e-3  # of a sample: an age that is no other than usual
 class WinchEstimator:
     """The filter's state, and what moves it.
 
-    Parameters
-    ----------
-    model
-        The prediction model.
-
-    Raises
-    ------
-    SolverError
-        If the Riccati equation has no solution.
-
-    Attributes
-    ----------
-    state
-        chi, (n,); belongs to the last `update`.
-    speed
-        Motor speed at the last update, as estimated [rad/s].
-    covariance, gain
-        Of the one-step prediction, (n, n), and with every signal there, (n, ny).
+    Raises SolverError if the Riccati equation has no solution.
     """
 
     def __init__(self, model: PredictionModel) -> None:

@@ -73,14 +73,9 @@ class Unsaturated:
     def poles(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> ComplexArray:
         """Return the poles of the closed loop on a plant, by default that of the model.
 
-        Parameters
-        ----------
-        plant
-            The plant.
-        share
-            How much of the torque that is asked for the drive gives: below one where it saturates
-            (the gain of its describing function; A. Gelb and W. E. Vander Velde, *Multiple-Input
-            Describing Functions and Nonlinear System Design*, 1968, sec. 2.3).  The filter is told.
+        The drive gives a share of the torque that is asked for, below one where it saturates (the
+        gain of its describing function; A. Gelb and W. E. Vander Velde, *Multiple-Input Describing
+        Functions and Nonlinear System Design*, 1968, sec. 2.3).  The filter is told.
         """
         A, B, C = _plant(self.model if plant is None else plant)
         Ac, Bc, Cc, Dc = self.controller if share == 1.0 else self._throttled(share)

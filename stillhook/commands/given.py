@@ -78,21 +78,11 @@ def parse_fixed(texts: Sequence[str]) -> dict[str, float]:
 def split_pairs(
     option: str, form: str, texts: Sequence[str], *, empty: bool = False
 ) -> dict[str, str]:
-    """Return texts by name from texts NAME=TEXT.
+    """Return texts by name from texts NAME=TEXT; `empty` ones if nothing may stand after the sign.
 
-    Parameters
-    ----------
-    option, form
-        The option and how it is written, for messages.
-    texts
-        What was given.
-    empty
-        Whether nothing may stand after the sign.
+    Messages say the option and its form.
 
-    Raises
-    ------
-    InputError
-        If a text is not of that form, or a name comes twice.
+    Raises InputError if a text is not of that form, or a name comes twice.
     """
     found: dict[str, str] = {}
     for text in texts:

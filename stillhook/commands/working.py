@@ -118,14 +118,7 @@ def place_for(arguments: argparse.Namespace, name: str, ending: str = "") -> Pat
 def prepared(arguments: argparse.Namespace, place: str | Path, ending: str = "") -> OutputFolder:
     """Return the folder for the results, with the figures that the arguments ask for.
 
-    Parameters
-    ----------
-    arguments
-        They say which figures, and may name the folder.
-    place
-        The folder; or a name, as for `place_for`.
-    ending
-        Stands behind the name.
+    They may name it; else it is `place`, or by that name, and the ending, as for `place_for`.
     """
     kinds = ("svg", "png") if arguments.format is None else (arguments.format,)
     if isinstance(place, str):

@@ -51,25 +51,13 @@ def controller_by_name(
     gains: Mapping[str, float] | None = None,
     sample_time: float | None = None,
 ) -> Controller:
-    """Return the controller of a name for a case.
+    """Return the controller of a name of `CONTROLLER_TEXTS` for a case.
 
-    Parameters
-    ----------
-    name
-        One of `CONTROLLER_TEXTS`.
-    case
-        The case.
-    design, gains
-        For feedback only.
-    sample_time
-        T [s]; by default the controller's own.
+    Design and gains are for feedback only; the sample time T [s] is by default the controller's
+    own.
 
-    Raises
-    ------
-    InputError
-        If there is no such controller, or what is given with it does not belong to it.
-    SolverError, SynthesisError
-        If it cannot be made for the case.
+    Raises InputError if there is no such controller, or what is given with it does not belong to
+    it; SolverError, SynthesisError if it cannot be made for the case.
     """
     pick("controllers", "controller", tuple(CONTROLLER_TEXTS), (name,))
     if name.startswith("feedback"):

@@ -91,19 +91,11 @@ class Recipe:
 def recipe_of(wanted: object, owner: str) -> Recipe:
     """Return the recipe that is meant.
 
-    Parameters
-    ----------
-    wanted
-        The name of a controller (`CONTROLLER_TEXTS`); a `Design` or a `Tuning`; a controller; or
-        a pair of a name and a design, a controller or a function of the case that returns a
-        controller.
-    owner
-        Who asks, for messages.
+    It may be meant by the name of a controller (`CONTROLLER_TEXTS`); a `Design` or a `Tuning`; a
+    controller; or a pair of a name and a design, a controller or a function of the case that
+    returns a controller.  Messages name the owner.
 
-    Raises
-    ------
-    InputError
-        If it is none of these, or the name is unknown.
+    Raises InputError if it is none of these, or the name is unknown.
     """
     if isinstance(wanted, str):
         pick(owner, "controller", tuple(CONTROLLER_TEXTS), (wanted,))

@@ -106,24 +106,13 @@ def _matrices(controller: LinearController) -> dict[str, Any]:
 def design_law(
     needs: str, case: Case, starts: int, progress: Progress | None = None
 ) -> StoredDesign:
-    """Return the law that is designed for a case.
+    """Return the law that is designed for a case, in its sea.
 
-    Parameters
-    ----------
-    needs
-        The name of a structure, for a law within the drive's limits; followed by
-        "-eager" for one that ignores them, or "-half" for one that keeps them in half the sea.
-    case
-        The case, in the sea that the law is for.
-    starts
-        Starts of the search.
-    progress
-        Called as progress(stage, done, total).
+    `needs` is the name of a structure, for a law within the drive's limits; followed by "-eager"
+    for one that ignores them, or "-half" for one that keeps them in half the sea.  `progress` is
+    called as progress(stage, done, total).
 
-    Raises
-    ------
-    InputError
-        If a limit lies below the static load.
+    Raises InputError if a limit lies below the static load.
     """
     if needs.endswith(EAGER):
         free = case.replace({"limits.drive": "report"})

@@ -36,19 +36,9 @@ def best_design(
 ) -> Design:
     """Return what `synth.optimise_gains` answers for a case: from the cache, where it is there.
 
-    Parameters
-    ----------
-    case
-        The case.
-    structure
-        Name of the structure; by default those that the case's sensors allow.
-    progress
-        Called as progress(stage, done, total).
+    Without a structure's name it is of those that the case's sensors allow.
 
-    Raises
-    ------
-    InputError
-        As by `synth.optimise_gains`.
+    Raises InputError as by `synth.optimise_gains`.
     """
     from synth import optimise_gains
 

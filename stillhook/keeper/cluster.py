@@ -33,19 +33,11 @@ _PATIENCE = 60.0  # for a scheduler to answer and to have a worker [s]
 class Cluster(Pool):
     """A dask cluster.
 
-    Parameters
-    ----------
-    address
-        ``local:N`` for N processes on this machine, started and ended with the work; or the
-        address of a scheduler, such as ``tcp://10.0.0.1:8786``, whose workers have the same
-        Stillhook installed.
-    client
-        A `distributed.Client` to use instead; it is left open.
+    Its address is ``local:N`` for N processes on this machine, started and ended with the work; or
+    that of a scheduler, such as ``tcp://10.0.0.1:8786``, whose workers have the same Stillhook
+    installed.  A `distributed.Client` may be used instead; it is left open.
 
-    Raises
-    ------
-    InputError
-        If the address is none, or the extra is not installed.
+    Raises InputError if the address is none, or the extra is not installed.
     """
 
     name = "cluster"

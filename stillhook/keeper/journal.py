@@ -34,24 +34,14 @@ Take = Callable[[Any, Any], None]
 
 
 class Journal:
-    """A journal on disk; a context manager that closes the file.
+    """A journal of a "sweep" or a "comparison" on disk; a context manager that closes the file.
 
-    Parameters
-    ----------
-    path
-        The file; it is made if there is none.
-    what
-        What it keeps, "sweep" or "comparison".
-    question
-        What its results answer, as plain data; "versions" are those of `versions`.
-    take
-        Called with key and values of every result that is there.
+    The file is made if there is none.  The question that its results answer is plain data;
+    "versions" are those of `versions`.  `take` is called with key and values of every result that
+    is there.
 
-    Raises
-    ------
-    InputError
-        If the file is not such a journal, is spoilt, answers another question, was written by
-        other code or is being written by another process, or cannot be written.
+    Raises InputError if the file is not such a journal, is spoilt, answers another question, was
+    written by other code or is being written by another process, or cannot be written.
     """
 
     def __init__(self, path: Path, what: str, question: Mapping[str, Any], take: Take) -> None:

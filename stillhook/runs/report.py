@@ -93,24 +93,10 @@ def runs_report(compared: Sequence[Runs]) -> Report:
 def write_traces(
     folder: OutputFolder, run: Run, format: TraceFormat = "csv", *, several: bool = False
 ) -> None:
-    """Write the time traces of a run.
+    """Write the time traces of a run, of several controllers into a folder each.
 
-    Parameters
-    ----------
-    folder
-        The folder.
-    run
-        The run.
-    format
-        Of the file.
-    several
-        Whether there are several controllers, each with a folder of its own.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written, as on a disk that is full, or the format takes a
-        package that is not installed.
+    Raises InputError if the file cannot be written, as on a disk that is full, or the format takes
+    a package that is not installed.
     """
     if format == "none" or not run.time.size:
         return
@@ -134,23 +120,11 @@ def write_summary(
 ) -> None:
     """Write the summary of runs, their events and their figures.
 
-    Parameters
-    ----------
-    folder
-        The folder, which may hold the traces of the runs already.
-    compared
-        Runs of one controller, or of several.
-    case
-        The case as it was given; by default that of the runs, as it is in the scenario.
-    question
-        What was asked, to be kept beside the answer; plain data.
-    progress
-        Called with what is being done, and the share of it that is.
+    The case is as it was given; by default that of the runs, as it is in the scenario.  The
+    question is plain data, to be kept beside the answer.  `progress` is called with what is being
+    done, and the share of it that is.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be written.
+    Raises InputError if a file cannot be written.
     """
     tell = progress or (lambda what, share: None)
     report = runs_report(compared)

@@ -39,17 +39,7 @@ _MOST_CELLS = 350  # beyond, the numbers in the cells would not be legible
 def scatter_figure(
     scatter: Scatter, *, name: str, height_step: float = 0.5, period_step: float = 1.0
 ) -> Figure:
-    """Return a scatter diagram with the share of each class of H_s and T_p.
-
-    Parameters
-    ----------
-    scatter
-        The sea states.
-    name
-        What they are, for the line under the title.
-    height_step, period_step
-        Widths of the classes [m], [s].
-    """
+    """Return a scatter diagram with the share of each class of H_s and T_p, so wide [m], [s]."""
     heights, periods, table = scatter.matrix(height_step, period_step)
     shown = np.where(table > 0.0, 100.0 * table, np.nan)
     often = np.unravel_index(int(np.argmax(table)), table.shape)
@@ -135,16 +125,7 @@ def records_report(
 ) -> Report:
     """Return what a file holds: what was kept and why, its statistics, its scatter, one spectrum.
 
-    Parameters
-    ----------
-    records
-        What was read.
-    chosen, sea
-        Number of the record that is looked at, and its spectrum.
-    name
-        The file.
-    steps
-        Widths of the classes of the scatter diagram, as `scatter_figure` takes them.
+    That is of the record `chosen`; `steps` are widths of classes, as `scatter_figure` takes them.
     """
     file, at = Path(name).name, _when(records, chosen)
     drawings = [

@@ -71,19 +71,10 @@ def violins(
 ) -> Figure:
     """Return how far each number spreads among the stable cases, over its nominal value.
 
-    Parameters
-    ----------
-    result
-        What a sweep returned.
-    design
-        Gives the nominal values; the median stands for them if left out.
-    names
-        Variables; by default payload, torque and speed rms and M_s, those there are.
+    The design gives that; the median stands for it if left out.  Names are by default payload,
+    torque and speed rms and M_s, those there are.
 
-    Raises
-    ------
-    InputError
-        If no case is stable, or a name is unknown.
+    Raises InputError if no case is stable, or a name is unknown.
     """
     chosen = [n for n in _MEASURES if n in result] if names is None else list(names)
     stable = stable_of(result)
@@ -119,19 +110,9 @@ def cumulative_share(
 ) -> Figure:
     """Return the share of all cases that stays below a value; unstable ones never do.
 
-    Parameters
-    ----------
-    result
-        What a sweep returned.
-    name
-        A variable of it.
-    design
-        Gives the nominal value.
+    The nominal value is that of the design.
 
-    Raises
-    ------
-    InputError
-        If no case is stable, or there is no such variable.
+    Raises InputError if no case is stable, or there is no such variable.
     """
     if name not in result:
         raise InputError(f"sweep: there is no {name!r} in this result")

@@ -49,17 +49,7 @@ _SHOWN = 12  # rows of the table at most
 
 
 def sweep_report(result: xr.Dataset, name: str, *, worst: int = 0) -> Report:
-    """Return what a sweep says.
-
-    Parameters
-    ----------
-    result
-        What `sh.sweep` returned.
-    name
-        Name of the nominal case.
-    worst
-        How many of the worst cases are told.
-    """
+    """Return what a sweep about the nominal case of a name says, and so many of the worst cases."""
     summary = SweepSummary.of(result)
     told = ", ".join(varied_paths(result))
     first, *others = summary.sentences
@@ -78,21 +68,9 @@ def sweep_report(result: xr.Dataset, name: str, *, worst: int = 0) -> Report:
 
 
 def write_sweep(folder: str | Path, result: xr.Dataset, *, worst: int = 0) -> list[Path]:
-    """Write a sweep into a folder; return the files, the case file of the worst first.
+    """Write a sweep into a folder, made if need be; return the files, so many worst cases' first.
 
-    Parameters
-    ----------
-    folder
-        The folder; it is made if need be.
-    result
-        What `sh.sweep` returned.
-    worst
-        How many of the worst cases become case files.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written.
+    Raises InputError if a file cannot be written.
     """
     place = OutputFolder.prepare(folder)
     written = []

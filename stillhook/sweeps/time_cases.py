@@ -157,16 +157,9 @@ class TimeQuestion:
 
 
 def seed_of(seed: int, index: int, *, common: bool = False) -> int:
-    """Return the seed of a case's run, which depends on nothing but these.
+    """Return the seed of a case's run, which depends on its number and the sweep's seed alone.
 
-    Parameters
-    ----------
-    seed
-        Of the sweep.
-    index
-        Number of the case.
-    common
-        Whether all cases meet the same sea and noise.
+    With a `common` one all cases meet the same sea and noise.
 
     Examples
     --------

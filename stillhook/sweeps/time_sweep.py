@@ -45,32 +45,15 @@ def run_sweep(
     store: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Run what is missing of a sweep, and return all of it.
+    """Run what is missing of a sweep, and return all of it along "case".
 
-    Parameters
-    ----------
-    question, draw
-        What every case is asked, and how the cases are drawn.
-    engine, jobs
-        As for `engine_of`.
-    store
-        Folder in which results are kept as they come, or file (``.nc``) beside whose name they
-        are (``.jsonl``); None for memory alone.
-    progress
-        Called as progress(what, done, total), several times a second; it may raise
-        KeyboardInterrupt.
+    Engine and jobs are as for `engine_of`.  The store is a folder in which results are kept as they
+    come, or a file (``.nc``) beside whose name they are (``.jsonl``); None for memory alone.
+    `progress` is called as progress(what, done, total), several times a second; it may raise
+    KeyboardInterrupt.  ``attrs["complete"]`` is 1 if every case is there, 0 after Ctrl-C.
 
-    Returns
-    -------
-    Dataset
-        Along "case"; ``attrs["complete"]`` is 1 if every case is there, 0 after Ctrl-C.
-
-    Raises
-    ------
-    InputError
-        If the spread cannot be run in time, or the store is another's or spoilt.
-    SolverError
-        If the cluster is gone.
+    Raises InputError if the spread cannot be run in time, or the store is another's or spoilt;
+    SolverError if the cluster is gone.
     """
     last = draw.first + draw.samples
     rows = draw.spread.sample(last, draw.sampling, draw.seed, start=draw.first, stop=last)
@@ -186,22 +169,13 @@ def template_of(question: TimeQuestion, draw: Draw, rows: FloatArray) -> xr.Data
 
 
 def engine_of(wanted: str | Pool | None, question: TimeQuestion, jobs: int | None = None) -> Pool:
-    """Return the pool that is meant: every one gives the same numbers.
+    """Return the pool that is meant, of so many processes: every one gives the same numbers.
 
-    Parameters
-    ----------
-    wanted
-        "serial", "processes", an address of a dask scheduler such as ``tcp://10.0.0.1:8786``,
-        ``local:4`` for a dask cluster of four processes here, or a pool; by default processes.
-    question
-        What is asked; a controller that cannot be sent anywhere is run in this process.
-    jobs
-        Number of processes.
+    It is "serial", "processes", an address of a dask scheduler such as ``tcp://10.0.0.1:8786``,
+    ``local:4`` for a dask cluster of four processes here, or a pool; by default processes.  A
+    controller that cannot be sent anywhere is run in this process.
 
-    Raises
-    ------
-    InputError
-        If there is no such engine, or the controller cannot be sent to it.
+    Raises InputError if there is no such engine, or the controller cannot be sent to it.
     """
     stays = not question.recipe.portable
     found: Pool

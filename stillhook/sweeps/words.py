@@ -113,22 +113,12 @@ class SweepSummary:
 
 
 def worst_cases(result: xr.Dataset, count: int, *, by: str = "payload_rms") -> list[int]:
-    """Return the numbers of the worst cases, the worst first.
+    """Return the numbers of so many of the worst cases, the worst first.
 
-    Parameters
-    ----------
-    result
-        What `sh.sweep` returned.
-    count
-        How many.
-    by
-        Of two stable cases the one with the larger value is worse; one that is not stable is
-        worse than all that are, and one that has no number there is worst.
+    Of two stable cases the one with the larger value is worse; one that is not stable is worse than
+    all that are, and one that has no number there is worst.
 
-    Raises
-    ------
-    InputError
-        If there is no such variable.
+    Raises InputError if there is no such variable.
     """
     check_range("worst cases", "count", count, low=1)
     pick("worst cases", "variable", tuple(str(name) for name in result.data_vars), (by,))

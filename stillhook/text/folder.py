@@ -83,23 +83,12 @@ class OutputFolder:
         kinds: Sequence[str] | None = None,
         progress: Callable[[str, int, int], None] | None = None,
     ) -> list[Path]:
-        """Draw figures and write them; return their files.
+        """Draw figures and write them, by default in the folder's kinds; return their files.
 
         Where there is nothing to draw a file of that name that an earlier run left is removed.
+        `progress` is called as progress("figures", done, total).
 
-        Parameters
-        ----------
-        drawings
-            The figures.
-        kinds
-            Endings of their files (default: those of the folder).
-        progress
-            Called as progress("figures", done, total).
-
-        Raises
-        ------
-        InputError
-            If a file cannot be written.
+        Raises InputError if a file cannot be written.
         """
         from . import style
 

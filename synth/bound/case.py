@@ -335,25 +335,11 @@ def high_order_for(
 
     M_s and gain margins hold as a disk of S that is no larger than they ask for; limits on slow
     motion and on roll-off as they are; those on peaks as limits on an rms.  Those on power and on
-    the delay margin are left out.
+    the delay margin are left out.  Drag is linear [N s/m], by default that with the drum held;
+    `rooms` are limits on the rms of signals, where they are to be tighter than the case's, by
+    name.  It has at most so many states.
 
-    Parameters
-    ----------
-    case
-        The case.
-    measurements
-        What it hears.
-    drag
-        Linear drag coefficient [N s/m]; by default that with the drum held.
-    rooms
-        Limits on the rms of signals, where they are to be tighter than the case's, by name.
-    states
-        At most; by default as many as it takes.
-
-    Raises
-    ------
-    SynthesisError
-        If none is found.
+    Raises SynthesisError if none is found.
     """
     question = pose(case)
     terms = _terms(question, measurements, question.drag_before if drag is None else drag, _FAINT)

@@ -113,24 +113,11 @@ def high_order(
 ) -> HighOrder:
     """Return a design's controller on the fewest states that lose little.
 
-    It is stable on the true plant with its exact delays and on the bound's own, keeps M_s on
-    the true one and the limits on the bound's, and loses at most two per cent.
+    It is stable on the true plant with its exact delays and on the bound's own, keeps M_s on the
+    true one and the limits on the bound's, and loses at most two per cent.  The design is of full
+    order, for somewhat less than `max_sensitivity`; the answer has at most so many `states`.
 
-    Parameters
-    ----------
-    design
-        Of full order, for somewhat less than this M_s.
-    max_sensitivity
-        M_s that it may have.
-    truth
-        As of `youla_design`.
-    states
-        At most; by default as many as it takes.
-
-    Raises
-    ------
-    SynthesisError
-        If no truncation does.
+    Raises SynthesisError if no truncation does.
     """
     bound = design.bound
     true = truth or Truth(plant=bound.plant)

@@ -123,23 +123,13 @@ def spectral_factor(disturbance: Disturbance, order: int = 8) -> SpectralFactor:
 def fit_spectral_factor(
     density: Callable[[FloatArray], FloatArray], band: tuple[float, float], order: int = 8
 ) -> SpectralFactor:
-    """Return the stable, minimum-phase filter that fits a one-sided density best.
+    """Return the stable, minimum-phase filter that fits a one-sided density per rad/s best.
 
-    Parameters
-    ----------
-    density
-        One-sided variance density per rad/s at omega [rad/s], (k,) -> (k,).
-    band
-        Band that holds the variance [rad/s].
-    order
-        Number of states: even, 2 to 12.
+    That leads from omega [rad/s], (k,), to (k,); the band holds the variance [rad/s].  The order,
+    of states, is even, 2 to 12.
 
-    Raises
-    ------
-    InputError
-        If the order is out of range, or the band is empty or holds no variance.
-    SolverError
-        If no fit converges.
+    Raises InputError if the order is out of range, or the band is empty or holds no variance;
+    SolverError if no fit converges.
     """
     check_range("spectral factor", "order", order, low=2, high=12)
     if order % 2:

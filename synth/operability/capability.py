@@ -49,14 +49,8 @@ def capability(
 ) -> Capability:
     """Return the largest regular heave that a winch can follow at given periods [s] (p,).
 
-    Parameters
-    ----------
-    system
-        The winch that follows.
-    criteria
-        Its limits: of peaks, of continuous ratings, and of power (on the box of the two peaks).
-    periods
-        Periods of the heave [s].
+    Its limits are those of peaks, of continuous ratings, and of power (on the box of the two
+    peaks).
     """
     given = np.asarray(periods, dtype=np.float64)
     order = np.argsort(-given)  # nodes ascend

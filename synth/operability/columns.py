@@ -120,21 +120,12 @@ class SeaColumn:
 def sea_column(
     case: Case, period: float | None, headings: Sequence[float] | None = None
 ) -> SeaColumn:
-    """Return the seas of one peak period.
+    """Return the seas of one peak period T_p [s], or the case's own; the spectrum keeps its shape.
 
-    Parameters
-    ----------
-    case
-        The case; its spectrum keeps its shape.
-    period
-        T_p [s]; None for the case's own.
-    headings
-        Headings [rad], for a vessel that has them.
+    Headings [rad] are for a vessel that has them.
 
-    Raises
-    ------
-    InputError
-        If the sea of the case has no period that could be changed, or the vessel no headings.
+    Raises InputError if the sea of the case has no period that could be changed, or the vessel no
+    headings.
     """
     # Of seas that nobody has asked for: a contour goes up to where waves break and beyond.
     changed = case.variant({} if period is None else case.sea.peaking_at(period))

@@ -120,18 +120,9 @@ def contour_of(
     highest: float = HIGHEST,
     step: Callable[[], None] = lambda: None,
 ) -> Contour:
-    """Return the contour of a system over the columns of a study.
+    """Return the contour of a system over the columns of a study, in order of their periods.
 
-    Parameters
-    ----------
-    system, criteria
-        What is moved, and what must be kept.
-    columns
-        The seas, in order of their periods.
-    highest
-        Highest H_s that is looked at [m].
-    step
-        Called after each column.
+    H_s is looked at up to `highest` [m]; `step` is called after each column.
     """
     found = []
     for column in columns:

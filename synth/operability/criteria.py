@@ -63,20 +63,11 @@ def payload_criteria(
 ) -> tuple[Limit, ...]:
     """Return how still the payload must be held, as criteria.
 
-    Parameters
-    ----------
-    case
-        The case, for its exposure time and exceedance.
-    rms, significant, maximum
-        Largest standard deviation, significant double amplitude (4 sigma) and largest amplitude
-        of the payload's motion in the case's exposure time: in metres, or text with a unit.
-    speed
-        Largest velocity of the payload in that time, in m/s or text with a unit.
+    The largest standard deviation, significant double amplitude (4 sigma) and largest amplitude of
+    its motion in the case's exposure time are in metres, or text with a unit; its largest velocity
+    in that time is in m/s or text with a unit.
 
-    Raises
-    ------
-    InputError
-        If a value is not above zero, or has another unit.
+    Raises InputError if a value is not above zero, or has another unit.
     """
     time = case.limits.equivalent_exposure
 

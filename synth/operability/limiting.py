@@ -187,14 +187,7 @@ class SeaStates:
 def _excess(limit: Limit, moments: SeaMoments, stationary: BoolArray) -> FloatArray:
     """Return by how much a limit is broken, relative; at most 0 where it is kept (r,).
 
-    Parameters
-    ----------
-    limit
-        What must be kept.
-    moments
-        Of the outputs.
-    stationary
-        Where there is a stationary motion at all (r,).
+    `stationary` says where there is a stationary motion at all (r,).
     """
     each = moments.members if limit.drive else [moments]
     # All that the limit asks of a programme's symbols is there.
@@ -206,28 +199,13 @@ def _excess(limit: Limit, moments: SeaMoments, stationary: BoolArray) -> FloatAr
 def limiting_heights(
     states: SeaStates, criteria: Sequence[Limit], *, highest: float = HIGHEST
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the lowest H_s at which each criterion breaks, in every heading of a column.
+    """Return the lowest H_s, up to `highest` [m], at which each criterion breaks, in each heading.
 
-    Parameters
-    ----------
-    states
-        The system in the column's seas.
-    criteria
-        What must be kept.
-    highest
-        Highest H_s that is looked at [m].
+    Heights are by criterion and heading (c, h) [m], 0 where the criterion is broken in a flat sea,
+    infinite where it is kept up to the highest; behind them is the drag coefficient at the lowest
+    of them (h,) [N s/m], NaN where that is 0 or infinite.
 
-    Returns
-    -------
-    heights, drag
-        Limiting H_s by criterion and heading (c, h) [m], 0 where the criterion is broken in a flat
-        sea, infinite where it is kept up to the highest; and the drag coefficient at the lowest of
-        them (h,) [N s/m], NaN where that is 0 or infinite.
-
-    Raises
-    ------
-    SolverError
-        If a root is not found in its bracket.
+    Raises SolverError if a root is not found in its bracket.
     """
     headings, count = len(states.column.hooks), len(criteria)
     heights = np.full((count, headings), np.inf)

@@ -46,23 +46,13 @@ class OperabilityQuestion:
 def pose_operability(
     source: Case | Design, wanted: Sequence[Limit], *, length: float | None = None
 ) -> OperabilityQuestion:
-    """Return what is asked of a design, or of a case alone.
+    """Return what is asked of a design, whose gains or parameters are kept, or of a case alone.
 
-    Parameters
-    ----------
-    source
-        A design, whose gains or parameters are kept, or a case.
-    wanted
-        Criteria on the payload.
-    length
-        Another length of rope than the case's [m]: the drum then is on the layer, and the rope as
-        stiff, as it is at that length; and the rope has the masses that a design made there asks
-        for, so that a limit is kept here if it is kept there.
+    At another length of rope than the case's [m] the drum is on the layer, and the rope as stiff,
+    as it is at that length; and the rope has the masses that a design made there asks for, so that
+    a limit is kept here if it is kept there.
 
-    Raises
-    ------
-    InputError
-        If the design has no controller, or the drum does not hold so much rope.
+    Raises InputError if the design has no controller, or the drum does not hold so much rope.
     """
     case = source if isinstance(source, Case) else source.case
     changes: dict[str, object] = {"limits.drive": "report"}

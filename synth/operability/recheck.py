@@ -52,33 +52,16 @@ class ContourCheck:
 
 
 def evaluate_in(design: Design, case: Case, masses: int | None = None) -> Assessment:
-    """Return a design's loop in the sea of a case, in numbers.
-
-    Parameters
-    ----------
-    design
-        The design; its gains or parameters are kept.
-    case
-        The case: its sea, vessel and rope.
-    masses
-        Rope masses; by default the design's.
-    """
+    """Return a design's loop, its parameters kept, in the sea of a case, on its vessel and rope."""
     case, masses = case.variant({"limits.drive": "report"}), masses or design.masses
     question = pose(case, design.structure, masses, built_for=design.built_for)
     return question.assess(design.parameters)
 
 
 def recheck(design: Design, at: AtDepth, count: int) -> tuple[ContourCheck, ...]:
-    """Return the binding criterion at some points of a contour by single evaluations.
+    """Return the binding criterion at some points of a design's contour by single evaluations.
 
-    Parameters
-    ----------
-    design
-        The design whose contour it is.
-    at
-        The length of rope that it is for.
-    count
-        Points to look at, spread over the contour; fewer where fewer have a limit.
+    They are spread over it; fewer where fewer have a limit.
     """
     contour = at.contours["loop"]
     limit = contour.limit

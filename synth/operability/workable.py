@@ -62,15 +62,8 @@ class Workable:
 def workable(contour: Contour, scatter: Scatter, heading: float | None = None) -> Workable:
     """Return the shares of the time in which a contour lets work be done.
 
-    Parameters
-    ----------
-    contour
-        The limiting H_s.
-    scatter
-        The diagram.
-    heading
-        Heading of the vessel [rad], where the contour has headings: the waves' relative to the
-        bow, or (where the diagram has directions) the bow's relative to the diagram's axis.
+    Where it has headings, the vessel's [rad] is the waves' relative to the bow, or (where the
+    diagram has directions) the bow's relative to the diagram's axis.
     """
     height, period, share = scatter.significant_height, scatter.peak_period, scatter.occurrence
     width = class_width(scatter)

@@ -19,17 +19,7 @@ from .family import Family, Member
 
 
 class FamilyPlants:
-    """A family with a controller structure, posed member by member.
-
-    Parameters
-    ----------
-    family
-        The family.
-    structure
-        Name of the structure.
-    masses
-        Rope masses of every plant; by default what each case asks for.
-    """
+    """A family with a controller structure, posed member by member, on its cases' masses."""
 
     def __init__(
         self, family: Family, structure: str = PAYLOAD_FEEDBACK, masses: int | None = None
@@ -78,16 +68,7 @@ class FamilyPlants:
         """Yield the closed loops of members of one kind, and which members they are.
 
         All have the most rope masses.  They are closed by the engine of sweeps, which no search
-        uses.
-
-        Parameters
-        ----------
-        values
-            The gains.
-        members
-            The members.
-        outputs, together
-            Those whose variances are wanted, and pairs of them whose covariances are.
+        uses.  Of the outputs variances are wanted, of the pairs `together` covariances.
         """
         kinds: dict[tuple[Any, ...], list[int]] = {}
         for k, member in enumerate(members):

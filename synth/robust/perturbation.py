@@ -64,19 +64,11 @@ def gain_radius(
 ) -> GainRadius:
     """Return how much the gains of a stable loop may be off.
 
-    Parameters
-    ----------
-    plant
-        A plant with one input; with quadratic drag, at the drag of the design.
-    law, values
-        The structure and its parameters.
-    names
-        The parameters that may be off; by default all in which the loop is affine.
+    The plant has one input; with quadratic drag it is at the drag of the design.  Without names it
+    is all parameters in which the loop is affine.
 
-    Raises
-    ------
-    InputError
-        If the plant has several inputs, the loop is unstable, or it is not affine in `names`.
+    Raises InputError if the plant has several inputs, the loop is unstable, or it is not affine in
+    `names`.
     """
     if len(plant.inputs) != 1:
         raise InputError(f"gain radius: the plant must have one input, got {len(plant.inputs)}")

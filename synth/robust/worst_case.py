@@ -189,22 +189,11 @@ def worst_members(
     seed: int = 0,
     known: Sequence[Member] = (),
 ) -> list[Figures]:
-    """Return members that hurt more than a tolerance, the worst first; none if there is none.
+    """Return at most so many members that hurt more than a tolerance, the worst first, or none.
 
-    Parameters
-    ----------
-    plants, values
-        The family and the gains.
-    level
-        The cost [m] that the gains are said to hold; it counts for the worst case only.
-    tolerance
-        Of the logarithm of cost over level, and of use of a limit.
-    most
-        How many to return.
-    seed
-        Of the Sobol points.
-    known
-        Members that are in the set already.
+    The gains are said to hold the cost `level` [m], which counts for the worst case only; the
+    tolerance is of the logarithm of cost over level, and of use of a limit.  Known members are in
+    the set already; the seed is that of the Sobol points.
     """
     family = plants.family
     count_cost = objective is Objective.WORST

@@ -139,23 +139,12 @@ def indices_of(
     confidence: float = 0.95,
     resamples: int = 199,
 ) -> SobolIndices:
-    """Return Sobol's indices of any function of a spread's rows.
+    """Return Sobol's indices of any function of a spread's rows, (n, d) to (n,), NaN for none.
 
-    Parameters
-    ----------
-    evaluate
-        From rows (n, d) to values (n,); NaN where there is none (unstable).
-    spread
-        Independent ranges in plain numbers (`Spread.on`).
-    samples, figure, seed, confidence
-        As in `sobol_indices`.
-    resamples
-        Of the bootstrap.
+    The ranges are independent, in plain numbers (`Spread.on`); the bootstrap draws so many
+    resamples, and the rest is as in `sobol_indices`.
 
-    Raises
-    ------
-    InputError
-        As in `sobol_indices`.
+    Raises InputError as in `sobol_indices`.
     """
     from scipy.stats import bootstrap
 

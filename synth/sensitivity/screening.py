@@ -89,16 +89,10 @@ def morris_screening(
 def effects_of(
     evaluate: Evaluate, spread: Spread, *, trajectories: int, figure: str = "figure", seed: int = 0
 ) -> Screening:
-    """Return the elementary effects of any positive function of a spread's rows.
+    """Return the elementary effects of any positive function of a spread's rows, (n, d) to (n,).
 
-    Parameters
-    ----------
-    evaluate
-        From rows (n, d) to values (n,), NaN where there is none.
-    spread
-        Ranges in plain numbers (`Spread.on`).
-    trajectories, figure, seed
-        As in `morris_screening`.
+    It is NaN where there is none.  The ranges are in plain numbers (`Spread.on`); the rest is as in
+    `morris_screening`.
     """
     check_range("sensitivity", "trajectories", trajectories, low=2, high=100_000)
     d = len(spread.paths)

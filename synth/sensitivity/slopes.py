@@ -75,18 +75,11 @@ class LoopSlopes:
         self._of_gains: list[FloatArray] = []
 
     def add_number(self, number: Number) -> tuple[str, ...]:
-        """Add a number of the case.
+        """Add a number of the case; return the sides of its value that have been added.
 
-        Returns
-        -------
-        tuple of str
-            The sides of its value that have been added, one variable each: ``("",)``, or ``below``
-            and ``above`` where it stands at the corner of a table.
+        They are ``("",)``, or ``below`` and ``above`` where it stands at the corner of a table.
 
-        Raises
-        ------
-        StepError
-            If something steps at its value.
+        Raises StepError if something steps at its value.
         """
         case = self._fixed.case
 

@@ -114,20 +114,10 @@ def choose(
     near: Answer,
     tell: Progress,
 ) -> ChosenMotor | str:
-    """Return the smallest motor of a catalogue that meets a target, or why there is none.
+    """Return the smallest motor of a catalogue that meets a target [m rms], or why there is none.
 
-    Parameters
-    ----------
-    case, structure, target
-        The case, the structure, and what the payload may move [m rms].
-    catalogue
-        Motors, the smallest first.
-    gears
-        Lowest and highest ratio.
-    masses, near
-        Rope masses, and an answer to begin from.
-    tell
-        Called as tell(stage, done, total).
+    Motors come the smallest first, gears by their lowest and highest ratio; `near` is an answer to
+    begin from.
     """
     smaller: list[str] = []
     for k, motor in enumerate(catalogue):

@@ -117,17 +117,8 @@ def follow(
 ) -> Answer | None:
     """Return the optimum of a problem from starts close to it, or None if none arrives.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    begins
-        Starts: answers of neighbours, or parameters.  Those that do not stabilise the loop are
-        left out.
-    goal, relaxed
-        See `synth.search.Programme`.
-    coefficients
-        Of the elements, for starts that are no answers.
+    Starts are answers of neighbours, or parameters, with the coefficients of the elements; those
+    that do not stabilise the loop are left out.  For goal and relaxed see `synth.search.Programme`.
     """
     known = tuple(coefficients or problem.begin)
     starts = [
@@ -198,16 +189,9 @@ def designed(
 
 
 def least_between(cost: Callable[[float], float], low: float, high: float, fine: float) -> float:
-    """Return where a cost of a positive number is least between two ends.
+    """Return where a cost of a positive number is least, to `fine` of its logarithm.
 
-    Parameters
-    ----------
-    cost
-        The cost; infinite where there is no answer.
-    low, high
-        The ends.
-    fine
-        Of the number's logarithm, to which the least is found.
+    The cost is infinite where there is no answer.
     """
     # Where a neighbour is infinite Brent's parabola is no number, and the step a golden section.
     with np.errstate(invalid="ignore"):

@@ -38,22 +38,9 @@ def best_of_each(
 ) -> list[Answer | None] | None:
     """Return the best answer to each problem of a row, None where there is none.
 
-    None alone where the searches at the ends and in the middle find nothing.
-
-    Parameters
-    ----------
-    problems
-        In the order of the row.
-    guesses
-        Parameters that the searches begin with, besides their own.
-    harder
-        Whether the problems get harder from the first to the last, or easier.
-    seed
-        Of the searches.
-    known
-        Searches that were made already, by the index of their problem.
-    tell
-        Called as tell(stage, done, total).
+    None alone where the searches at the ends and in the middle find nothing.  Searches begin with
+    the guesses too; those that were made already are known by the index of their problem.  The
+    problems get harder from the first to the last, or easier.
     """
     begins: list[tuple[int, Answer | FloatArray]] = []
     for n, k in enumerate((0, len(problems) // 2, len(problems) - 1)):

@@ -83,20 +83,9 @@ def least_motor(
     near: Answer,
     scale: float = 1.0,
 ) -> SizePoint:
-    """Return the smallest motor behind a gear.
+    """Return the smallest motor behind a gear with which the payload moves `target` [m].
 
-    Parameters
-    ----------
-    case, structure
-        The case, its motor the one of scale 1, and the structure.
-    gear, target
-        Ratio of the gear [-] and rms that the payload may have [m].
-    masses
-        Rope masses.
-    near
-        An answer nearby, to begin from.
-    scale
-        Scale to begin with.
+    The case's motor is that of scale 1; the search begins with `scale` and an answer nearby.
     """
     known: list[tuple[float, float]] = []
     rest = math.log(_at_rest(case, gear))
@@ -234,14 +223,8 @@ def highest_sea(
 ) -> float:
     """Return the highest H_s in which the winch of a case meets a target [m]; 0 if none does.
 
-    Parameters
-    ----------
-    case, structure, target
-        The case in the sea asked for, the structure, and the target as `target_of` reads it.
-    masses, near
-        Rope masses, and an answer to begin from.
-    tell
-        Called as tell(stage, done, total).
+    The case is in the sea asked for, the target as `target_of` reads it; `near` is an answer to
+    begin from.
     """
     asked = case.sea.significant_height
     known: list[tuple[float, float]] = []  # logarithms of H_s and of the factor that is missing

@@ -106,16 +106,9 @@ def limit_items(limits: Sequence[Limit]) -> list[Item]:
 
 
 def part_items(case: Case, heard: Sequence[str], heave: float) -> list[Item]:
-    """Return gear, motor, sensors and delays that a structure's design depends on.
+    """Return gear, motor, sensors and delays that a design depends on, by what it hears.
 
-    Parameters
-    ----------
-    case
-        The case.
-    heard
-        Measurements that the structure hears.
-    heave
-        Rms of the hook's heave [m].
+    `heave` is the rms of the hook's heave [m].
     """
     ratio, torque = case.winch.gearbox.ratio, case.winch.drive.torque_continuous
     found = [

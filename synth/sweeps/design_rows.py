@@ -480,16 +480,9 @@ def _agreeing_drag(quadratic: FloatArray, start: float, velocity: Velocity) -> F
     """Return the drag that agrees with each loop's response, (n,) [N s/m]; infinite for none.
 
     C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms.  More drag means less motion, so
-    that the right side falls; where a loop is unstable it is given more.
-
-    Parameters
-    ----------
-    quadratic
-        q of the drag force q |v| v of each, (n,) [N s2/m2].
-    start
-        About where to begin [N s/m].
-    velocity
-        rms of the payload's velocity of loops `rows` with drag C, (m,); infinite if unstable.
+    that the right side falls; where a loop is unstable it is given more.  q is of the drag force q
+    |v| v of each, (n,) [N s2/m2]; `velocity` gives the rms of the payload's velocity of loops
+    `rows` with drag C, (m,), infinite if unstable.
     """
     slope = quadratic * np.sqrt(8.0 / np.pi)
     x = np.full(quadratic.size, np.log(max(start, 1.0)))

@@ -32,16 +32,9 @@ CHUNK = 33_000  # numbers of an array at once: two stay in the second-level cach
 
 
 class SpringLoops:
-    """Closed loops of one spring without delay, as polynomials in s/reference.
+    """Closed loops of one spring without delay, as polynomials in s/reference [rad/s].
 
-    Parameters
-    ----------
-    loops
-        The loops, their delays zero, of a controller whose parameters are a, a1 and a2.
-    amplifier
-        What these are multiplied by, A.
-    reference
-        Frequency by which s is scaled [rad/s].
+    Their controllers' parameters are a, a1 and a2, multiplied by the amplifier A.
     """
 
     def __init__(self, loops: ChainLoops, *, amplifier: float, reference: float) -> None:

@@ -79,17 +79,10 @@ class SweepNodes(ReadOnlyArrays):
 def sweep_panels(
     axis: FrequencyAxis, splits: Sequence[float], marks: Sequence[complex] | None = None
 ) -> list[Panel]:
-    """Return panels of an axis, as their ends on it.
+    """Return panels of an axis, as their ends on it; some end at the splits [rad/s].
 
-    Parameters
-    ----------
-    axis
-        The band.
-    splits
-        Frequencies where panels end [rad/s].
-    marks
-        Poles s [1/s] of the one loop that the panels are for, if they are: then all panels are a
-        quarter as long, and shorter yet near the poles.
+    Where they are for one loop, of poles `marks` [1/s], all are a quarter as long, and shorter yet
+    near these.
     """
     longest = longest_panel(_PER_DECADE * (1.0 if marks is None else 4.0))
     near = axis.poles(p for p in marks or () if p.real != 0.0)

@@ -67,16 +67,8 @@ def survey(
     """Return how many poles loops have in the right half plane, and their M_s, (m,) each.
 
     The count is -1 where a pole is on the axis; M_s = max 1/|1 + L| is that of any loop, stable or
-    not.
-
-    Parameters
-    ----------
-    loops
-        The loops.
-    rows
-        Which of them; all if left out.
-    peaks
-        Whether M_s is wanted: else it is NaN, and what stands in its way need not be followed.
+    not.  It is of some `rows` of the loops, by default all.  Without `peaks` M_s is NaN, and what
+    stands in its way need not be followed.
     """
     chosen = np.arange(len(loops)) if rows is None else rows
     count = np.empty(chosen.size, dtype=np.intp)

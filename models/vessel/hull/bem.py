@@ -340,14 +340,7 @@ def cached_hydrodynamics(
 ) -> tuple[Hydrodynamics, bool]:
     """Return the coefficients of :func:`models.vessel.hull.bem.solve_hull`, and if they were kept.
 
-    Parameters
-    ----------
-    hull, threads, progress
-        As there.
-    cache
-        Whether to look into the cache and to add to it.
-    asked
-        What the coefficients depend on: frequencies, headings, depth, density, lid.
+    `asked` is what they depend on: frequencies, headings, depth, density, lid.
     """
     folder = cache_folder() / "hulls"
     place = folder / f"{_digest(hull, asked)}.npz"

@@ -31,10 +31,8 @@ _OPEN = 0.02  # of the volume by which its three expressions may differ for the 
 class Hull:
     """The wetted surface of a floating hull, in panels of four corners.
 
-    Raises
-    ------
-    InputError
-        If a corner is not finite or above the waterline, or the surface is not closed below it.
+    Raises InputError if a corner is not finite or above the waterline, or the surface is not closed
+    below it.
     """
 
     name: str  #: What it is called.

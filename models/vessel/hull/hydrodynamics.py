@@ -238,23 +238,10 @@ def solved_motions(
 ) -> ComplexArray:
     """Return what the equation of motion says, for any number n of degrees of freedom (k, h, n).
 
-    Parameters
-    ----------
-    omega
-        Frequencies (k,) [rad/s].
-    inertia, damping
-        Mass with added mass, and damping (k, n, n).
-    stiffness
-        (n, n).
-    force
-        (k, h, n), time factor e^{+i omega t}.
-    owner
-        Whose equation it is, for the message.
+    Frequencies are (k,) [rad/s], mass with added mass and damping (k, n, n), stiffness (n, n), the
+    force (k, h, n) with the time factor e^{+i omega t}; messages name the owner.
 
-    Raises
-    ------
-    InputError
-        If the equation has no finite solution.
+    Raises InputError if the equation has no finite solution.
     """
     w = omega[:, None, None]
     matrix = -(w**2) * inertia + 1j * w * damping + stiffness

@@ -97,27 +97,13 @@ class Loading:
         radii: tuple[float | None, float | None, float | None] = (None, None, None),
         density: float = SEA_WATER_DENSITY,
     ) -> Loading:
-        """Return the loading of a vessel that floats upright and level.
+        """Return the loading of a vessel that floats upright and level, of its KG or GM [m].
 
-        Parameters
-        ----------
-        waterplane
-            Of the hull.
-        kg
-            Height of the centre of gravity above the keel, the lowest point [m].
-        gm
-            Or: transverse metacentric height [m].
-        radii
-            Radii of gyration of roll, pitch, yaw [m]; usual values where left out: 0.37 of the
-            beam, and a quarter of the length.
-        density
-            Of the water [kg/m3].
+        Radii of gyration of roll, pitch, yaw [m] are the usual ones where left out: 0.37 of the
+        beam, and a quarter of the length.  The water's density is in kg/m3.
 
-        Raises
-        ------
-        InputError
-            If not exactly one of `kg` and `gm` is given, the vessel would not float upright, or
-            a figure is out of range.
+        Raises InputError if not exactly one of `kg` and `gm` is given, the vessel would not float
+        upright, or a figure is out of range.
         """
         if (kg is None) == (gm is None):
             came = "neither" if kg is None else "both"

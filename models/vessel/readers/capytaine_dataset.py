@@ -29,22 +29,12 @@ _SINGLES = {"water_depth": "m", "rho": "kg/m3", "g": "m/s2", "forward_speed": "m
 
 
 class CapytaineData:
-    """An open dataset, read whole into memory.
+    """An open dataset, read whole into memory from its bytes; messages call it `owner`.
 
-    Parameters
-    ----------
-    owner
-        The file, for messages.
-    data
-        Its bytes; if they are HDF5, known to be readable by
-        :func:`models.basics.hdf5_check.check_hdf5`.
-    chosen
-        Which value to take where the file holds several water depths or forward speeds.
+    HDF5 is known to be readable by :func:`models.basics.hdf5_check.check_hdf5`; `chosen` is the
+    value to take where the file holds several water depths or forward speeds.
 
-    Raises
-    ------
-    InputError
-        If it is no NetCDF, is damaged, or is not one of Capytaine's.
+    Raises InputError if it is no NetCDF, is damaged, or is not one of Capytaine's.
     """
 
     def __init__(
