@@ -1,8 +1,10 @@
 """Stability margins of a loop from its frequency response, refined until grid-free.
 
 Every margin here is that of a loop that is stable at its nominal gain and delay; whether it
-is, `synth.loop.assess` asks of the poles.  Peaks are found on a grid and refined by zooming,
-crossings by bisection, so that no figure depends on the grid's spacing.
+is, `synth.loop.assess` asks of the poles.  Peaks are found on a grid and refined on polynomials
+through ever closer nodes, crossings by inverse interpolation, so that no figure depends on the
+grid's spacing.  Evaluations are dear one by one and cheap together: all places are looked for at
+once, several nodes at a time.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from models.basics import BoolArray, ComplexArray, FloatArray
 
@@ -18,13 +21,14 @@ LoopGain = Callable[[FloatArray], ComplexArray]
 """From frequencies [rad/s], (k,), to L there, (k,), or that of n loops, (n, k)."""
 
 _NOTHING = 1e-9  # |L| below which neither a peak nor a crossing matters to any margin
-_CLOSE, _MOST_STEPS = 1e-14, 60  # relative width of a bracket that is a point; steps towards it
-_ZOOM = np.linspace(0.0, 1.0, 17)
-_ROUNDS = 7  # each zooms by a factor of eight: 8^7 is 2e6
+_CLOSE, _MOST_STEPS = 1e-13, 50  # relative width of a bracket that is a point; steps towards it
+_HAIR = 0.1  # share of a bracket beside the first guess of a crossing in it
+_ORDER = 10  # of the polynomials about a minimum
+_TABLE = 257  # points at which a polynomial is looked at
+_ROUNDS = 12  # each narrows by a factor of three at least: 3^12 is 5e5
 _NEARER = 0.5  # share of a least height on the grid below which there may be zeros beside it
 _LEVEL = 1e-12  # relative depth of a minimum below which it is none
-_FORETOLD = 1e-11  # relative error of a parabola that the next round makes as good as exact
-_ROUNDING = 1e-15  # relative, of a value
+_RESOLVED = 1e-11  # relative size of a polynomial's last terms where it is as good as the function
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,33 +201,37 @@ def _all_minima(
     inner = inner + 1
     best, at = values[which, inner], grid[inner]
     low, high = grid[inner - 1], grid[inner + 1]
-    rows, foretold, known = np.arange(inner.size), np.zeros(inner.size, np.bool_), best + 1.0
-    for _ in range(_ROUNDS if inner.size else 0):
-        settled, before = foretold, known  # one round more makes the place as good as the value
-        nodes = low[:, None] + (high - low)[:, None] * _ZOOM
-        inside = function(nodes.ravel()).reshape(-1, *nodes.shape)[which, rows]
-        k = np.argmin(inside, axis=1)
-        middle = np.clip(k, 1, _ZOOM.size - 2)
-        low, high = nodes[rows, middle - 1], nodes[rows, middle + 1]
-        # The vertex of the parabola through the best node and its neighbours, and how well the
-        # function is foretold there: a smooth minimum is found in two or three rounds.
-        left, mid, right = (inside[rows, middle + i] for i in (-1, 0, 1))
-        bend = left - 2.0 * mid + right
-        # Clipped before the division, which would overflow where the nodes are all but level.
-        reach = 2.0 * np.maximum(bend, 0.0)
-        step = np.clip(left - right, -reach, reach) / np.where(reach > 0.0, reach, 1.0)
-        vertex = nodes[rows, middle] + step * 0.5 * (high - low)
-        lowest = function(vertex)[which, rows]
-        known = best
-        for place, value in ((nodes[rows, k], inside[rows, k]), (vertex, lowest)):
-            better = value < best
-            best, at = np.where(better, value, best), np.where(better, place, at)
-        error = np.abs(lowest - mid + 0.5 * bend * step**2)
-        foretold = settled | (error <= _FORETOLD * np.abs(lowest))
-        at = np.where(foretold & (lowest <= best * (1.0 + _ROUNDING)), vertex, at)
-        # At an edge of the function the grid's own point stays the best.
-        if np.all(settled | (best == before)):
+    ends = np.stack([values[which, inner - 1], values[which, inner + 1]])
+    sought = np.arange(inner.size)
+    for _ in range(_ROUNDS):
+        if not sought.size:
             break
+        own, width = which[sought], (high - low)[sought]
+        nodes = low[sought, None] + width[:, None] * _LOBATTO
+        inside = np.empty_like(nodes)
+        inside[:, [0, -1]] = ends[:, sought].T
+        new = function(nodes[:, 1:-1].ravel()).reshape(len(values), sought.size, -1)
+        inside[:, 1:-1] = new[own, np.arange(sought.size)]
+        k, before = np.argmin(inside, axis=1), best[sought]
+        rows = np.arange(sought.size)
+        better = inside[rows, k] < before
+        best[sought] = np.where(better, inside[rows, k], before)
+        at[sought] = np.where(better, nodes[rows, k], at[sought])
+        # To the nodes on either side of the best place.
+        left = np.sum(nodes < at[sought, None], axis=1) - 1
+        right = np.sum(nodes <= at[sought, None], axis=1)
+        left, right = np.maximum(left, 0), np.minimum(right, _ORDER)
+        low[sought], high[sought] = nodes[rows, left], nodes[rows, right]
+        ends[:, sought] = inside[rows, left], inside[rows, right]
+        place, least, error = _vertex(inside)
+        resolved = error <= _RESOLVED * np.abs(best[sought])
+        done = sought[resolved]
+        at[done] = nodes[resolved, 0] + width[resolved] * place[resolved]
+        best[done] = np.minimum(best[done], least[resolved])
+        # At an edge of the function the grid's own point stays the best.
+        if np.all(resolved | ~better):
+            break
+        sought = sought[~resolved]
     rest = lower & level
     found = []
     for i, own in enumerate(values):
@@ -233,6 +241,46 @@ def _all_minima(
             (np.concatenate([at[mine], grid[others]]), np.concatenate([best[mine], own[others]]))
         )
     return found
+
+
+def _lobatto() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return nodes between 0 and 1, a matrix from values there to those of a table, and to terms.
+
+    The table holds value, slope, bend and its rate, (4, points, nodes), on even points; the terms
+    are the coefficients of the Chebyshev polynomials (Trefethen, *Approximation Theory and
+    Approximation Practice*, ch. 3).
+    """
+    angles = np.arange(_ORDER + 1) * np.pi / _ORDER
+    nodes = -np.cos(angles)
+    terms = np.linalg.inv(chebyshev.chebvander(nodes, _ORDER))
+    points = np.linspace(-1.0, 1.0, _TABLE)
+    slopes = [chebyshev.chebder(np.eye(_ORDER + 1), order) for order in range(4)]
+    table = [
+        chebyshev.chebvander(points, len(d) - 1) @ d @ terms * 2.0**i for i, d in enumerate(slopes)
+    ]
+    return 0.5 * (1.0 + nodes), np.array(table), terms
+
+
+_LOBATTO, _TO_TABLE, _TO_TERMS = _lobatto()
+
+
+def _vertex(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return place (between 0 and 1), height and error of minima of polynomials, (m,) each.
+
+    From their values at the nodes, (m, n).  The error is the size of the last two terms.
+    """
+    error = np.abs(values @ _TO_TERMS[-2:].T).sum(axis=1)
+    k = np.argmin(values @ _TO_TABLE[0].T, axis=1)
+    height, slope, bend, rate = np.einsum("imn,mn->im", _TO_TABLE[:, k], values)
+    # Halley's step to where the slope is zero, not beyond the next point of the table.
+    with np.errstate(all="ignore"):
+        step = -2.0 * slope * bend / (2.0 * bend**2 - slope * rate)
+    far = 1.0 / (_TABLE - 1)
+    step = np.clip(np.nan_to_num(step), -far, far)
+    place = np.clip(k * far + step, 0.0, 1.0)
+    step = place - k * far
+    height = height + step * (slope + step * (0.5 * bend + step * rate / 6.0))
+    return place, height, error
 
 
 def _turns(grid: FloatArray, values: FloatArray) -> FloatArray:
@@ -268,35 +316,52 @@ def _crossings(
 
     They are evaluated together, and all places are looked for at once; those count that have an
     end among the points where `among`, (f, k), is true.
-    By Chandrupatla's method (Adv. Eng. Software 28, 1997): inverse quadratic interpolation
-    where it is safe, bisection elsewhere.
+    A few nodes at a time: the last guess, a hair to both sides of it, and half way to the farther
+    end, so that the bracket is halved at least; the next guess is by inverse interpolation.
     """
     # Zero counts as positive, so that a crossing that falls on a grid point is seen once.
     changed = (values[:, :-1] >= 0.0) != (values[:, 1:] >= 0.0)
     which, at = np.nonzero(changed & (among[:, :-1] | among[:, 1:]))
-    rows = np.arange(at.size)
-    a, b = grid[at + 1], grid[at]  # a is the latest point
-    fa, fb = values[which, at + 1], values[which, at]
-    step = np.full(at.size, 0.5)
+    low, high = grid[at], grid[at + 1]
+    f_low, f_high = values[which, at], values[which, at + 1]
+    place = low + (high - low) * f_low / (f_low - f_high)
+    hair = _HAIR * (high - low)
+    sought = np.flatnonzero((f_low != 0.0) & (f_high != 0.0))
     for _ in range(_MOST_STEPS):
-        width = np.abs(b - a)
-        smallest = _CLOSE * np.abs(a)
-        if not np.any((width > smallest) & (fa != 0.0)):
+        if not sought.size:
             break
-        least = np.minimum(0.5, smallest / np.maximum(width, smallest))
-        x = a + np.clip(step, least, 1.0 - least) * (b - a)
-        fx = function(x)[which, rows]
-        same = (fx >= 0.0) == (fa >= 0.0)
-        c, fc = np.where(same, a, b), np.where(same, fa, fb)
-        b, fb = np.where(same, b, a), np.where(same, fb, fa)
-        a, fa = x, fx
-        with np.errstate(divide="ignore", invalid="ignore"):
-            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
-            inverse = fa / (fb - fa) * fc / (fb - fc)
-            inverse += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-        step = np.where((phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi), inverse, 0.5)
-    nearest = np.asarray(np.where(np.abs(fa) <= np.abs(fb), a, b))
-    return [nearest[which == i] for i in range(len(values))]
+        a, b, x = low[sought], high[sought], place[sought]
+        beside = np.minimum(hair[sought], 0.4 * np.minimum(x - a, b - x))
+        half = x + 0.5 * np.where(x - a > b - x, a - x, b - x)
+        nodes = np.sort([a, x - beside, x, x + beside, half, b], axis=0)
+        new = function(nodes[1:-1].ravel()).reshape(len(values), -1, sought.size)
+        rows = np.arange(sought.size)
+        f = np.vstack([f_low[sought], new[which[sought], :, rows].T, f_high[sought]])
+        first = np.argmax((f[1:] >= 0.0) != (f[:-1] >= 0.0), axis=0)
+        a, b = nodes[first, rows], nodes[first + 1, rows]
+        low[sought], high[sought] = a, b
+        f_low[sought], f_high[sought] = f[first, rows], f[first + 1, rows]
+        guess, error = _inverse(nodes, f)
+        line = a + (b - a) * f_low[sought] / (f_low[sought] - f_high[sought])
+        inside = (a <= guess) & (guess <= b)
+        place[sought] = np.where(inside, guess, line)
+        hair[sought] = np.where(inside, np.maximum(error, _CLOSE * b), _HAIR * (b - a))
+        there = (inside & (error <= _CLOSE * b)) | (b - a <= _CLOSE * b)
+        sought = sought[~there]
+    return [place[which == i] for i in range(len(values))]
+
+
+def _inverse(nodes: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where functions vanish by inverse interpolation, and how well that is known.
+
+    From values at nodes, (n, m); by Neville's scheme.
+    """
+    guess, before = nodes, nodes
+    with np.errstate(all="ignore"):
+        for k in range(1, len(nodes)):
+            low, high = values[:-k], values[k:]
+            before, guess = guess, (high * guess[:-1] - low * guess[1:]) / (high - low)
+        return guess[0], np.abs(before - guess).min(axis=0)
 
 
 def level_ends(gain: ComplexArray) -> BoolArray:
