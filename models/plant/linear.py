@@ -349,24 +349,37 @@ class LinearPlant(ReadOnlyArrays):
         )
 
     def select(
-        self, *, outputs: Sequence[str] | None = None, measurements: Sequence[str] | None = None
+        self,
+        *,
+        outputs: Sequence[str] | None = None,
+        measurements: Sequence[str] | None = None,
+        disturbances: Sequence[str] | None = None,
     ) -> LinearPlant:
-        """Return the plant with some outputs and measurements only, in the order given.
+        """Return the plant with some signals only, in the order given.
+
+        Disturbances keep their rates, which stand behind them.
 
         Raises InputError if a name is unknown.
         """
         outputs = self.outputs if outputs is None else tuple(outputs)
         measurements = self.measurements if measurements is None else tuple(measurements)
+        own = self.independent_disturbances if disturbances is None else tuple(disturbances)
+        rates = {name: base for name, base in self.rates.items() if base in own}
+        kept = self.disturbances if disturbances is None else (*own, *rates)
         z = pick(_OWNER, "output", self.outputs, outputs)
         y = pick(_OWNER, "measurement", self.measurements, measurements)
-        known = {*self.states, *self.inputs, *self.disturbances, *outputs, *measurements}
+        w = pick(_OWNER, "disturbance", self.disturbances, kept)
+        known = {*self.states, *self.inputs, *kept, *outputs, *measurements}
         return self._with(
+            E=self.E[:, w],
             C=self.C[y],
             D=self.D[y],
-            F=self.F[y],
+            F=self.F[np.ix_(y, w)],
             Cz=self.Cz[z],
             Dz=self.Dz[z],
-            Fz=self.Fz[z],
+            Fz=self.Fz[np.ix_(z, w)],
+            disturbances=kept,
+            rates=MappingProxyType(rates),
             outputs=outputs,
             measurements=measurements,
             delays=tuple(self.delays[i] for i in y),

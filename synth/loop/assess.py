@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from copy import copy
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, lru_cache, partial
 
 import numpy as np
 from scipy.optimize import brentq
@@ -29,10 +29,16 @@ from models.plant import LinearPlant, consistent_drag, settled_drag
 
 from .controller import LinearController, closed_loop_plant, closed_loop_poles
 from .disturbance import CoherentError, Disturbance
-from .elements import Coefficients, DragElement, Element, with_elements, without_losses
+from .elements import (
+    Coefficients,
+    DragElement,
+    Element,
+    with_elements,
+    without_losses,
+)
 from .margins import Margins, least_distances, loop_margins, refine_minima
 from .pole_region import PoleRegion, with_delay_models
-from .responses import LoopBlocks, LoopResponses, differences, with_loops
+from .responses import Closing, LoopBlocks, LoopResponses, blocks_with, with_loops
 
 _RTOL = 1e-8  # of every variance
 _GRID_PER_DECADE = 150
@@ -44,6 +50,8 @@ _LOSS_ROUNDS, _LOSS_AGREES = 200, 1e-12  # of their coefficients on given nodes
 _SECANTS, _AGREED, _LONGEST = 25, 1e-12, 2.0  # steps, accuracy, longest step in logarithms
 _LEAST = -12.0  # logarithm of the share of its losses with which a stuck loop may move
 _VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
+
+_ENDS = "velocity", "force"  # of an element
 
 Nodes = Callable[[ComplexArray], Quadrature]
 Grid = Callable[[ComplexArray], FloatArray]
@@ -86,7 +94,6 @@ class Assessment:
         self.elements = tuple(elements)
         self._given = coefficients
         self._nodes, self._dense = nodes, grid
-        self._parts: dict[tuple[LinearPlant, tuple[str, ...]], LinearPlant] = {}
         self._signs: FloatArray = np.zeros(0)
         # What `members` share: nodes; m_0 and m_2 of outputs and covariances of pairs, the means
         # over the signs and what each sign adds, (.., 1 + e); and standard deviations by cause.
@@ -112,12 +119,10 @@ class Assessment:
         return with_elements(self._bare, self.elements, self.coefficients)
 
     @cached_property
-    def _plants(self) -> list[LinearPlant]:
-        """The plant that moves, and without its losses where it has some."""
+    def _sides(self) -> list[Coefficients]:
+        """The coefficients of the loop that moves, and without its losses where it has some."""
         still = without_losses(self.elements, self.coefficients)
-        if still == list(self.coefficients):
-            return [self.plant]
-        return [self.plant, with_elements(self._bare, self.elements, still)]
+        return [self.coefficients, *([] if still == list(self.coefficients) else [still])]
 
     @cached_property
     def poles(self) -> ComplexArray:
@@ -141,12 +146,9 @@ class Assessment:
     @property
     def stable(self) -> bool:
         """Whether all poles lie in the left half plane, without losses too."""
-        others = [closed_loop_poles(with_delay_models(p)[0], self.controller) for p in self._still]
+        still = [with_elements(self._bare, self.elements, side) for side in self._sides[1:]]
+        others = [closed_loop_poles(with_delay_models(p)[0], self.controller) for p in still]
         return self.decays and all(poles.real.max(initial=-np.inf) < 0.0 for poles in others)
-
-    @property
-    def _still(self) -> list[LinearPlant]:
-        return self._plants[1:]
 
     @cached_property
     def grid(self) -> FloatArray:
@@ -263,8 +265,9 @@ class Assessment:
             if channel is None:
                 curves = [np.asarray(1.0 + gain) for gain in self._gains(omega)]
             else:
-                others = [self._closed([channel[0]], [channel[1]], omega, p) for p in self._still]
-                curves = [self.response(*channel, omega), *(o.responses[0, 0] for o in others)]
+                still, names = self._sides[1:], ([channel[0]], [channel[1]])
+                others = [r[0, 0] for r in self._closed(*names, omega, still)]
+                curves = [self.response(*channel, omega), *others]
             return np.asarray(np.max([size(omega, curve) for curve in curves], axis=0))
 
         places = np.append(self.grid, [share * edge for edge in edges for share in (1e-4, 1.0)])
@@ -363,7 +366,7 @@ class Assessment:
     ) -> ComplexArray:
         """Return the closed-loop responses of outputs to disturbances, (z, w, k)."""
         if self._rational is None:
-            return self._closed(outputs, sources, omega).responses
+            return self._closed(outputs, sources, omega, self._sides[:1])[0]
         found = LoopBlocks.of(self._rational.response(omega), outputs, sources)
         return found.zw
 
@@ -372,14 +375,31 @@ class Assessment:
         outputs: Sequence[str],
         sources: Sequence[str],
         omega: FloatArray,
-        plant: LinearPlant | None = None,
-    ) -> LoopResponses:
-        key = plant or self.plant, tuple(outputs)
-        if key not in self._parts:
-            self._parts[key] = key[0].select(outputs=key[1])
-        part = self._parts[key]
-        response = part.response(part.beside_poles(omega))
-        return LoopResponses.of(response, self.controller, sources)
+        sides: Sequence[Coefficients],
+    ) -> list[ComplexArray]:
+        """Return closed-loop responses, (z, w, k), with the elements at some coefficients each."""
+        loops = self._loops(outputs, sources, omega, sides)
+        return [loop.responses[: len(outputs), : len(sources)] for loop in loops]
+
+    def _loops(
+        self,
+        outputs: Sequence[str],
+        sources: Sequence[str],
+        omega: FloatArray,
+        sides: Sequence[Coefficients],
+    ) -> list[LoopResponses]:
+        """Return the closed loop with the elements at some coefficients each.
+
+        Velocities and forces of the elements stand behind the outputs and the disturbances.
+        """
+        if not sides:
+            return []
+        velocities, forces = ([getattr(e, name) for e in self.elements] for name in _ENDS)
+        named = dict.fromkeys([*outputs, *velocities]), dict.fromkeys([*sources, *forces])
+        part = _part(self._bare, *(tuple(names) for names in named))
+        blocks = LoopBlocks.of(part.response(part.beside_poles(omega)))
+        law = Closing.of(self.controller, blocks.s)
+        return [LoopResponses(blocks_with(blocks, self.elements, side), law) for side in sides]
 
     @cached_property
     def _rational(self) -> LinearPlant | None:
@@ -398,18 +418,17 @@ class Assessment:
 
     def _gains(self, omega: FloatArray) -> ComplexArray:
         """Return L of each loop, (loops, k); with the losses first, then without."""
-        plant, losses, sides = self._broken
-        response = plant.response(plant.beside_poles(omega))
-        return differences(response, self.controller, losses, sides) - 1.0
+        loops = self._loops((), (), omega, self._sides)
+        inputs = range(len(self._bare.inputs))
+        return np.array([loop.difference(i) - 1.0 for loop in loops for i in inputs])
 
-    @cached_property
-    def _broken(self) -> tuple[LinearPlant, list[tuple[str, str]], list[list[float]]]:
-        """The plant of all loops, velocities and forces of its losses, their coefficients."""
-        pairs = list(zip(self.elements, self.coefficients, strict=True))
-        losses = [(e, c) for e, c in pairs if not e.lasting and c]
-        plant = self._plants[-1].select(outputs=[e.velocity for e, _ in losses])
-        sides = [[c for _, c in losses], [0.0] * len(losses)] if losses else [[]]
-        return plant, [(e.velocity, e.force) for e, _ in losses], sides
+
+@lru_cache(maxsize=64)
+def _part(
+    plant: LinearPlant, outputs: tuple[str, ...], disturbances: tuple[str, ...]
+) -> LinearPlant:
+    """Return some of a plant's signals, of which many controllers ask for the same."""
+    return plant.select(outputs=outputs, disturbances=disturbances)
 
 
 def frequency_grid(poles: ComplexArray) -> FloatArray:
@@ -493,13 +512,14 @@ def consistent_coefficients(
     # The plant as it is, decomposed once for all.
     plain = Assessment(plant, controller, disturbances, nodes=nodes)
     velocities = [e.velocity for e in elements]
-    names = [*(d.name for d in disturbances), *(e.force for e in elements)]
+    names = [*dict.fromkeys([*(d.name for d in disturbances), *(e.force for e in elements)])]
+    forces = [names.index(e.force) for e in elements]
 
     def moved(known: Sequence[float]) -> Callable[[Sequence[float]], FloatArray]:
         """Return the variances of the velocities by coefficients, on nodes that suit some."""
         found = loop(*known).quadrature(velocities)
         closed = plain._responses(velocities, names, found.omega)
-        shaken, felt = closed[:, : len(disturbances)], closed[:, len(disturbances) :]
+        shaken, felt = closed[:, : len(disturbances)], closed[:, forces]
         density = np.array([d.density(found.omega) for d in disturbances]) * found.weights
         cross = np.einsum("awk,bwk->abk", shaken * density, shaken.conj())
         reference = np.array([e.reference for e in elements])

@@ -41,6 +41,7 @@ from models.plant import PlantResponse
 
 from .controller import LinearController
 from .dual import Dual
+from .elements import Coefficients, Element
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,6 +116,13 @@ class Closing:
     slopes: Mapping[tuple[int, int], tuple[list[int], ComplexArray]] | None = None
     count: int = 0
 
+    @classmethod
+    def of(cls, controller: LinearController, s: ComplexArray) -> Closing:
+        """Return what a controller closes a loop with at points `s`, (k,) [1/s]."""
+        law = controller.response_at(s).transpose(1, 2, 0)
+        entries = {(i, j): law[i, j] for i in range(law.shape[0]) for j in range(law.shape[1])}
+        return cls(entries=entries, size=law.shape[:2])
+
     def part(self, which: slice) -> Closing:
         """Return some of the points."""
         slopes = self.slopes
@@ -161,10 +169,7 @@ class LoopResponses:
         sources: Sequence[str] | None = None,
     ) -> LoopResponses:
         """Return the closed loop of a plant's response and a controller of its measurements."""
-        law = controller.response_at(response.s)
-        size = law.shape[1], law.shape[2]
-        entries = {(i, j): law[:, i, j] for i in range(size[0]) for j in range(size[1])}
-        return cls(LoopBlocks.of(response, sources=sources), Closing(entries=entries, size=size))
+        return cls(LoopBlocks.of(response, sources=sources), Closing.of(controller, response.s))
 
     @property
     def omega(self) -> FloatArray:
@@ -297,49 +302,23 @@ class LoopResponses:
         return _real_product(slope, slope)
 
 
-def differences(
-    response: PlantResponse,
-    controller: LinearController,
-    elements: Sequence[tuple[str, str]],
-    sides: Sequence[Sequence[float]],
-) -> ComplexArray:
-    """Return 1 + L of each loop broken at a command, by elements' coefficients, (loops, k).
+def blocks_with(
+    blocks: LoopBlocks, elements: Sequence[Element], coefficients: Coefficients
+) -> LoopBlocks:
+    """Return the blocks of a plant with elements, as `with_elements`, by a rank-one change each.
 
-    Parameters
-    ----------
-    response
-        That of the plant without the elements, with what the controller hears.
-    controller
-        What closes the loops.
-    elements
-        Velocity and force of each element.
-    sides
-        Coefficients of the elements, force = -c velocity; all loops of one set after the other's.
+    Velocities and forces must be among the outputs and the disturbances.
     """
-    law = controller.response_at(response.s)
-    z = [response.outputs.index(velocity) for velocity, _ in elements]
-    w = [response.disturbances.index(force) for _, force in elements]
-    heard = np.concatenate([response.yu, response.yw[:, :, w]], axis=2)
-    moved = np.concatenate([response.zu[:, z], response.zw[:, z][:, :, w]], axis=2)
-    yu = np.concatenate([heard, moved], axis=1).transpose(1, 2, 0)
-    rows, columns, k = yu.shape
-    blocks = LoopBlocks(
-        s=response.s,
-        zw=np.zeros((0, 0, k), complex),
-        zu=np.zeros((0, columns, k), complex),
-        yw=np.zeros((rows, 0, k), complex),
-        yu=yu,
-        outputs=(),
-        sources=(),
-    )
-    m, n = law.shape[1:]
-    entries = {(i, j): law[:, i, j] for i in range(m) for j in range(n)}
-    found = []
-    for side in sides:
-        own = {(m + i, n + i): np.full(len(law), -c, complex) for i, c in enumerate(side) if c}
-        loop = LoopResponses(blocks, Closing(entries=entries | own, size=(columns, rows)))
-        found += [loop.difference(i) for i in range(m)]
-    return np.array(found)
+    zw, zu, yw, yu = blocks.zw, blocks.zu, blocks.yw, blocks.yu
+    for element, coefficient in zip(elements, coefficients, strict=True):
+        gain = element.reference - coefficient
+        v, f = blocks.outputs.index(element.velocity), blocks.sources.index(element.force)
+        around = gain / (1.0 - gain * zw[v, f])
+        by_w, by_u = around * zw[v], around * zu[v]
+        into_z, into_y = zw[:, f, None], yw[:, f, None]
+        zw, zu = zw + into_z * by_w, zu + into_z * by_u
+        yw, yu = yw + into_y * by_w, yu + into_y * by_u
+    return replace(blocks, zw=zw, zu=zu, yw=yw, yu=yu)
 
 
 def _real_product(a: ComplexArray, b: ComplexArray) -> FloatArray:
