@@ -21,12 +21,13 @@ takes T_top/k_t from Y.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import ComplexArray
+from ..basics import ComplexArray, pick
 from .equations import DISTURBANCES, INPUTS, MEASUREMENTS, RATES, UPPER_TENSION
 from .plant_data import PlantData, as_plant_data
 from .response import PlantResponse
@@ -34,13 +35,22 @@ from .response import PlantResponse
 if TYPE_CHECKING:
     from ..case import Case
 
+# What of command, hook's heave and force on the payload is in each column, see `line_response`.
+_COLUMNS = np.array([[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 
-def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) -> PlantResponse:
+
+def line_response(
+    source: Case | PlantData,
+    s: npt.ArrayLike,
+    *,
+    drag: float,
+    disturbances: Sequence[str] | None = None,
+) -> PlantResponse:
     """Return the exact response of a case's plant at points s (k,) [1/s], such as i omega.
 
     Safe from overflow for any Re s >= 0: every hyperbolic function is carried as its product with
     exp(-gamma).  No point may be a pole (s = 0 is one).  The payload's equivalent linear drag is C
-    [N s/m].
+    [N s/m]; of the disturbances some may be named, by default all are there.
     """
     data = as_plant_data(source)
     s = np.array(s, dtype=np.complex128).reshape(-1)
@@ -58,12 +68,11 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     # Torque balance of the shaft, solved for its angle: the rope is a spring T_Y on the drum.
     shaft = data.inertia * s**2 + (data.viscous_friction + back) * s + load * h * T_Y
     # columns: command, heave, force on the payload, set-point
-    zero = np.zeros_like(s)
-    one = np.ones_like(s)
-    angle = np.stack([forward, -load * T_Y, -load * T_F, forward]) / shaft
-    command = np.stack([one, zero, zero, one])
-    heave = np.stack([zero, one, zero, zero])
-    force = np.stack([zero, zero, one, zero])
+    own = tuple(name for name in DISTURBANCES if name not in RATES)
+    wanted = own if disturbances is None else tuple(disturbances)
+    columns = [0, *(1 + k for k in pick("plant response", "disturbance", own, wanted))]
+    command, heave, force = _COLUMNS[:, columns, None]
+    angle = (forward * command - load * (T_Y * heave + T_F * force)) / shaft
     top = h * angle + heave
     payload = P_Y * top + P_F * force
     torque = forward * command - back * s * angle
@@ -82,7 +91,7 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
     if data.sheaves_efficiency < 1.0:
         z[UPPER_TENSION] = upper
     if data.motor == "dc":
-        z["motor.voltage"] = command
+        z["motor.voltage"] = np.broadcast_to(command, angle.shape)
     # Exact delay and low-passes: no Pade model, no states.
     sensor = np.exp(-s * (data.delay + data.command_delay))
     for bandwidth in (data.sensor_bandwidth, data.telemetry_bandwidth):
@@ -97,7 +106,7 @@ def line_response(source: Case | PlantData, s: npt.ArrayLike, *, drag: float) ->
         yw=y_rows[:, :, 1:],
         yu=y_rows[:, :, :1],
         inputs=INPUTS,
-        disturbances=tuple(name for name in DISTURBANCES if name not in RATES),
+        disturbances=wanted,
         measurements=MEASUREMENTS,
         outputs=tuple(z),
     )

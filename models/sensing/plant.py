@@ -288,60 +288,73 @@ def sensed_line_at(
     drag: float,
     friction: float = 0.0,
     data: PlantData | None = None,
+    measurements: Sequence[str] | None = None,
+    disturbances: Sequence[str] | None = None,
 ) -> PlantResponse:
     """Return the exact response of a case's rope, drive and sensors at points s (k,) [1/s].
 
     No point is a pole (s = 0 is one).  The payload's equivalent linear drag is in N s/m, the
     friction that of losses which switch, beside the motor's own [N m s/rad].  Names are those of
-    `sensed_plant`, the rope `models.plant.line_response`.
+    `sensed_plant`, the rope `models.plant.line_response`.  Measurements and disturbances may be
+    named, by default all are there.
     """
     data = PlantData.from_case(case) if data is None else data
-    loaded = replace(data, viscous_friction=data.viscous_friction + friction)
-    line, sensors = line_response(loaded, s, drag=drag), case.sensors
+    heard = MEASURED if measurements is None else tuple(measurements)
+    noises = tuple(name for name in NOISES if name != "mru.error_rate")
+    if disturbances is not None:
+        noises = tuple(name for name in noises if name in disturbances)
+        disturbances = [name for name in disturbances if name not in noises]
+    if friction:
+        data = replace(data, viscous_friction=data.viscous_friction + friction)
+    line, sensors = line_response(data, s, drag=drag, disturbances=disturbances), case.sensors
+    points, names = line.s, (*line.disturbances, *noises)
+    own, unit = 1 + len(line.disturbances), sensors.mru or PERFECT
+    # By row, column (the command's, then the disturbances') and point.
+    z, rows = (
+        np.zeros((count, 1 + len(names), points.size), np.complex128)
+        for count in (len(line.outputs), len(heard))
+    )
+    z[:, :1], z[:, 1:own] = line.zu.transpose(1, 2, 0), line.zw.transpose(1, 2, 0)
     if friction:
         # Signals of the drive without what losses take, see `with_loads`.
-        zw, zu, speed = line.zw.copy(), line.zu.copy(), line.outputs.index("motor.speed")
+        speed = line.outputs.index("motor.speed")
         for name, per in data.per_torque.items():
-            for block in (zw, zu):
-                block[:, line.outputs.index(name)] -= friction * per * block[:, speed]
-        line = replace(line, zw=zw, zu=zu)
-    points, nw, at = line.s, len(line.disturbances), MEASURED.index
-    noises = tuple(name for name in NOISES if name != "mru.error_rate")
-    yw = np.zeros((points.size, len(MEASURED), nw + len(noises)), complex)
-    yu = np.zeros((points.size, len(MEASURED), len(line.inputs)), complex)
-    shown = _aboard(line.outputs)
-    yw[:, _OF_PLANT, :nw] = np.concatenate([line.yw, line.zw[:, shown]], axis=1)
-    yu[:, _OF_PLANT] = np.concatenate([line.yu, line.zu[:, shown]], axis=1)
-    if sensors.load_cell is not None:
-        weighed = 1.0 / (1.0 + points / sensors.load_cell.bandwidth)
-        for block in (yw, yu):
-            block[:, at("rope.tension")] *= weighed[:, None]
-    unit = sensors.mru or PERFECT
-    passed, late = unit_response(unit, points), np.exp(-points * unit.delay)
-    for name, rate in (("mru.heave", 1.0), ("mru.heave_rate", points)):
-        yw[:, at(name), line.disturbances.index("hook.heave")] = rate * passed
-        yw[:, at(name), nw + noises.index("mru.error")] = rate * late
-    sent = np.exp(-points * (data.delay + data.command_delay))
-    for name in (*MEASUREMENTS, "rope.tension"):
-        noise = 1.0 if name == "rope.tension" else sent
-        yw[:, at(name), nw + noises.index(f"{name}_noise")] = noise
+            z[line.outputs.index(name)] -= friction * per * z[speed]
+    shown = dict(zip((*ENCODER, "rope.tension"), _aboard(line.outputs), strict=True))
+    for row, name in zip(rows, heard, strict=True):
+        if name in shown:
+            row[:] = z[shown[name]]
+        elif name in MEASUREMENTS:
+            at = line.measurements.index(name)
+            row[:1], row[1:own] = line.yu[:, at].T, line.yw[:, at].T
+        else:
+            rate = points if name == "mru.heave_rate" else 1.0
+            if "hook.heave" in names:
+                row[1 + names.index("hook.heave")] = rate * unit_response(unit, points)
+            if "mru.error" in noises:
+                row[1 + names.index("mru.error")] = rate * np.exp(-points * unit.delay)
+        if name == "rope.tension" and sensors.load_cell is not None:
+            row /= 1.0 + points / sensors.load_cell.bandwidth
+        if (noise := f"{name}_noise") in noises:
+            sent = 0.0 if name == "rope.tension" else data.delay + data.command_delay
+            row[1 + names.index(noise)] = np.exp(-points * sent)
     # The payload's rows are late by telemetry and command already, the others by neither.
-    further = _payload_delays(sensors)
-    holds = payload_holds(sensors.payload)
+    further, holds = _payload_delays(sensors), payload_holds(sensors.payload)
     turned = late_and_held(
         points[:, None],
-        [further.get(name, data.command_delay) for name in MEASURED],
-        [holds.get(name, 0.0) for name in MEASURED],
+        [further.get(name, data.command_delay) for name in heard],
+        [holds.get(name, 0.0) for name in heard],
     )
-    yw, yu = yw * turned[:, :, None], yu * turned[:, :, None]
-    still = np.zeros((points.size, len(line.outputs), len(noises)))
+    rows *= np.ascontiguousarray(turned.T)[:, None]
+    z, y = z.transpose(2, 0, 1), rows.transpose(2, 0, 1)
     return replace(
         line,
-        zw=np.concatenate([line.zw, still], axis=2),
-        yw=yw,
-        yu=yu,
-        disturbances=(*line.disturbances, *noises),
-        measurements=MEASURED,
+        zw=z[:, :, 1:],
+        zu=z[:, :, :1],
+        yw=y[:, :, 1:],
+        yu=y[:, :, :1],
+        disturbances=names,
+        measurements=heard,
     )
 
 
