@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from copy import copy
+from dataclasses import replace
 from functools import cache, cached_property, lru_cache, partial
 
 import numpy as np
@@ -50,8 +51,6 @@ _LOSS_ROUNDS, _LOSS_AGREES = 200, 1e-12  # of their coefficients on given nodes
 _SECANTS, _AGREED, _LONGEST = 25, 1e-12, 2.0  # steps, accuracy, longest step in logarithms
 _LEAST = -12.0  # logarithm of the share of its losses with which a stuck loop may move
 _VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
-
-_ENDS = "velocity", "force"  # of an element
 
 Nodes = Callable[[ComplexArray], Quadrature]
 Grid = Callable[[ComplexArray], FloatArray]
@@ -125,6 +124,12 @@ class Assessment:
         return [self.coefficients, *([] if still == list(self.coefficients) else [still])]
 
     @cached_property
+    def _plants(self) -> list[LinearPlant]:
+        """The plant at each of the sides."""
+        still = (with_elements(self._bare, self.elements, side) for side in self._sides[1:])
+        return [self.plant, *still]
+
+    @cached_property
     def poles(self) -> ComplexArray:
         """Poles of the closed loop [1/s], delays as Pade models."""
         return closed_loop_poles(self._modelled[0], self.controller)
@@ -146,7 +151,7 @@ class Assessment:
     @property
     def stable(self) -> bool:
         """Whether all poles lie in the left half plane, without losses too."""
-        still = [with_elements(self._bare, self.elements, side) for side in self._sides[1:]]
+        still = self._plants[1:]
         others = [closed_loop_poles(with_delay_models(p)[0], self.controller) for p in still]
         return self.decays and all(poles.real.max(initial=-np.inf) < 0.0 for poles in others)
 
@@ -210,8 +215,10 @@ class Assessment:
     def covariance(self, one: str, other: str) -> float:
         """Return the covariance of two outputs."""
         if (one, other) not in self._products:
-            nodes = self._kept.get(self.plant.outputs) or self._on([one, other])
-            responses, shaken = self._all([one, other], nodes.omega)
+            outputs = self.plant.outputs if self.plant.outputs in self._kept else (one, other)
+            nodes = self._on(outputs)
+            every, shaken = self._on_nodes(outputs, nodes)
+            responses = every[[outputs.index(one), outputs.index(other)]]
             mean = np.sum((responses[0].conj() * responses[1]).real * shaken * nodes.weights)
             first, second = responses
             added = self._crossed(first, second, shaken, nodes)[0]
@@ -265,9 +272,8 @@ class Assessment:
             if channel is None:
                 curves = [np.asarray(1.0 + gain) for gain in self._gains(omega)]
             else:
-                still, names = self._sides[1:], ([channel[0]], [channel[1]])
-                others = [r[0, 0] for r in self._closed(*names, omega, still)]
-                curves = [self.response(*channel, omega), *others]
+                names, sides = ([channel[0]], [channel[1]]), range(len(self._sides))
+                curves = [self._closed(*names, omega, side)[0, 0] for side in sides]
             return np.asarray(np.max([size(omega, curve) for curve in curves], axis=0))
 
         places = np.append(self.grid, [share * edge for edge in edges for share in (1e-4, 1.0)])
@@ -325,7 +331,7 @@ class Assessment:
 
     def _integrate(self, outputs: Sequence[str]) -> None:
         nodes = self._on(outputs)
-        responses, shaken = self._all(outputs, nodes.omega)
+        responses, shaken = self._on_nodes(outputs, nodes)
         parts = np.abs(responses) ** 2 * shaken * nodes.weights
         variances, rates = parts.sum(axis=2), parts @ nodes.omega**2
         means = np.stack([variances.sum(axis=1), rates.sum(axis=1)], axis=1)
@@ -365,46 +371,34 @@ class Assessment:
         self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray
     ) -> ComplexArray:
         """Return the closed-loop responses of outputs to disturbances, (z, w, k)."""
-        if self._rational is None:
-            return self._closed(outputs, sources, omega, self._sides[:1])[0]
-        found = LoopBlocks.of(self._rational.response(omega), outputs, sources)
-        return found.zw
+        return self._closed(outputs, sources, omega, 0)
 
     def _closed(
         self,
         outputs: Sequence[str],
         sources: Sequence[str],
         omega: FloatArray,
-        sides: Sequence[Coefficients],
-    ) -> list[ComplexArray]:
-        """Return closed-loop responses, (z, w, k), with the elements at some coefficients each."""
-        loops = self._loops(outputs, sources, omega, sides)
-        return [loop.responses[: len(outputs), : len(sources)] for loop in loops]
+        side: int,
+    ) -> ComplexArray:
+        """Return closed-loop responses, (z, w, k), at one of the sides."""
+        plant, elements = self._base(side)
+        names = tuple(outputs), tuple(sources)
+        found = _plain(plant, self.controller, elements, *names, omega)
+        return self._with_elements(found, side)[: len(outputs), : len(sources)]
 
-    def _loops(
-        self,
-        outputs: Sequence[str],
-        sources: Sequence[str],
-        omega: FloatArray,
-        sides: Sequence[Coefficients],
-    ) -> list[LoopResponses]:
-        """Return the closed loop with the elements at some coefficients each.
+    def _base(self, side: int) -> tuple[LinearPlant, tuple[Element, ...]]:
+        """Return a plant whose responses are asked for, and what of its elements is changed in it.
 
-        Velocities and forces of the elements stand behind the outputs and the disturbances.
+        On nodes that are made from poles that is the plant as it is.  Nodes that adapt want all
+        digits, of which a change of a plant without damping costs some.
         """
-        if not sides:
-            return []
-        velocities, forces = ([getattr(e, name) for e in self.elements] for name in _ENDS)
-        named = dict.fromkeys([*outputs, *velocities]), dict.fromkeys([*sources, *forces])
-        part = _part(self._bare, *(tuple(names) for names in named))
-        blocks = LoopBlocks.of(part.response(part.beside_poles(omega)))
-        law = Closing.of(self.controller, blocks.s)
-        return [LoopResponses(blocks_with(blocks, self.elements, side), law) for side in sides]
+        if self._nodes is None:
+            return self._plants[side], ()
+        return self._bare, self.elements
 
-    @cached_property
-    def _rational(self) -> LinearPlant | None:
-        """The closed loop as a plant, finite at the poles of the open one; None if it is late."""
-        return None if any(self.plant.delays) else closed_loop_plant(self.plant, self.controller)
+    def _with_elements(self, plain: LoopBlocks, side: int) -> ComplexArray:
+        elements = self._base(side)[1]
+        return blocks_with(plain, elements, self._sides[side][: len(elements)]).zw
 
     def _spectra(self, outputs: Sequence[str], omega: FloatArray) -> FloatArray:
         """Return what each disturbance alone makes of each output, (z, w, k)."""
@@ -418,9 +412,23 @@ class Assessment:
 
     def _gains(self, omega: FloatArray) -> ComplexArray:
         """Return L of each loop, (loops, k); with the losses first, then without."""
-        loops = self._loops((), (), omega, self._sides)
-        inputs = range(len(self._bare.inputs))
+        velocities, forces = _ends(self.elements)
+        part = _part(self._bare, velocities, forces)
+        blocks = LoopBlocks.of(part.response(part.beside_poles(omega)))
+        law, inputs = Closing.of(self.controller, blocks.s), range(len(self._bare.inputs))
+        sides = (blocks_with(blocks, self.elements, side) for side in self._sides)
+        loops = [LoopResponses(side, law) for side in sides]
         return np.array([loop.difference(i) - 1.0 for loop in loops for i in inputs])
+
+    def _on_nodes(
+        self, outputs: Sequence[str], nodes: Quadrature
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Return what `_all` does, on nodes that others ask for as well."""
+        plant, elements = self._base(0)
+        end = plant, self.controller, elements, self.disturbances
+        plain, densities = _plain_on(*end, tuple(outputs), nodes)
+        responses = self._with_elements(plain, 0)
+        return responses[: len(outputs), : len(self.disturbances)], densities
 
 
 @lru_cache(maxsize=64)
@@ -429,6 +437,59 @@ def _part(
 ) -> LinearPlant:
     """Return some of a plant's signals, of which many controllers ask for the same."""
     return plant.select(outputs=outputs, disturbances=disturbances)
+
+
+@lru_cache(maxsize=4)
+def _rational(plant: LinearPlant, controller: LinearController) -> LinearPlant:
+    """Return a closed loop as a plant, finite at the poles of the open one."""
+    return closed_loop_plant(plant, controller)
+
+
+def _ends(elements: Sequence[Element]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names of the velocities and of the forces of elements."""
+    return tuple(e.velocity for e in elements), tuple(e.force for e in elements)
+
+
+def _plain(
+    plant: LinearPlant,
+    controller: LinearController,
+    elements: Sequence[Element],
+    outputs: tuple[str, ...],
+    sources: tuple[str, ...],
+    omega: FloatArray,
+) -> LoopBlocks:
+    """Return the closed loop's responses with the elements as the plant holds them.
+
+    Velocities and forces of the elements stand behind the outputs and the disturbances.
+    """
+    velocities, forces = _ends(elements)
+    outputs, sources = (*dict.fromkeys(outputs + velocities),), (*dict.fromkeys(sources + forces),)
+    late = any(plant.delays)
+    part = _part(plant if late else _rational(plant, controller), outputs, sources)
+    blocks = LoopBlocks.of(part.response(part.beside_poles(omega)))
+    if late:
+        closed = LoopResponses(blocks, Closing.of(controller, blocks.s)).responses
+        blocks = replace(blocks, zw=closed)
+    # All commands are made in the loop.
+    return replace(blocks, zu=blocks.zu[:, :0], yw=blocks.yw[:0], yu=blocks.yu[:0, :0])
+
+
+@lru_cache(maxsize=2)
+def _plain_on(
+    plant: LinearPlant,
+    controller: LinearController,
+    elements: tuple[Element, ...],
+    disturbances: tuple[Disturbance, ...],
+    outputs: tuple[str, ...],
+    nodes: Quadrature,
+) -> tuple[LoopBlocks, FloatArray]:
+    """Return `_plain` on nodes, and the densities there, (w, k).
+
+    The coefficients are looked for on the nodes that variances are then taken on.
+    """
+    sources = tuple(d.name for d in disturbances)
+    plain = _plain(plant, controller, elements, outputs, sources, nodes.omega)
+    return plain, np.array([d.density(nodes.omega) for d in disturbances])
 
 
 def frequency_grid(poles: ComplexArray) -> FloatArray:
@@ -509,19 +570,19 @@ def consistent_coefficients(
         return not loop(*all_with(coefficient)).decays
 
     at = np.nan  # the coefficient that the nodes are for
-    # The plant as it is, decomposed once for all.
-    plain = Assessment(plant, controller, disturbances, nodes=nodes)
-    velocities = [e.velocity for e in elements]
-    names = [*dict.fromkeys([*(d.name for d in disturbances), *(e.force for e in elements)])]
-    forces = [names.index(e.force) for e in elements]
+    velocities, _ = _ends(elements)
+    # On nodes that are made from poles alone the variances are taken, too.
+    wanted = velocities if nodes is None else plant.outputs
+    end = plant, controller, tuple(elements), tuple(disturbances)
 
     def moved(known: Sequence[float]) -> Callable[[Sequence[float]], FloatArray]:
         """Return the variances of the velocities by coefficients, on nodes that suit some."""
         found = loop(*known).quadrature(velocities)
-        closed = plain._responses(velocities, names, found.omega)
-        shaken, felt = closed[:, : len(disturbances)], closed[:, forces]
-        density = np.array([d.density(found.omega) for d in disturbances]) * found.weights
-        cross = np.einsum("awk,bwk->abk", shaken * density, shaken.conj())
+        plain, densities = _plain_on(*end, wanted, found)
+        rows = [plain.outputs.index(e.velocity) for e in elements]
+        forces = [plain.sources.index(e.force) for e in elements]
+        shaken, felt = plain.zw[rows, : len(densities)], plain.zw[rows][:, forces]
+        cross = np.einsum("awk,bwk->abk", shaken * (densities * found.weights), shaken.conj())
         reference = np.array([e.reference for e in elements])
 
         def variances(others: Sequence[float]) -> FloatArray:

@@ -189,10 +189,16 @@ class _OnTheRope:
     def _still(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return L without losses, and the motor's speed by a torque on its shaft, (k,) each."""
         data, controller = self.question.data, self.loop.controller
-        line = sensed_line_at(self.question.case, s, drag=self.drag, data=data)
+        line = sensed_line_at(
+            self.question.case,
+            s,
+            drag=self.drag,
+            data=data,
+            measurements=controller.measurements,
+            disturbances=(),
+        )
         speed = line.zu[:, line.outputs.index("motor.speed"), 0] / data.torque_per_command(s)
-        heard = line.select(measurements=controller.measurements)
-        return np.asarray(LoopResponses.of(heard, controller).difference(0) - 1.0), speed
+        return np.asarray(LoopResponses.of(line, controller).difference(0) - 1.0), speed
 
     def _poles(self) -> ComplexArray:
         """Return the light poles of the rope with the loop open and with it closed [1/s]."""
