@@ -252,7 +252,7 @@ def _lobatto() -> tuple[FloatArray, FloatArray, FloatArray]:
     """
     angles = np.arange(_ORDER + 1) * np.pi / _ORDER
     nodes = -np.cos(angles)
-    terms = np.linalg.inv(chebyshev.chebvander(nodes, _ORDER))
+    terms: FloatArray = np.linalg.inv(chebyshev.chebvander(nodes, _ORDER)).astype(np.float64)
     points = np.linspace(-1.0, 1.0, _TABLE)
     slopes = [chebyshev.chebder(np.eye(_ORDER + 1), order) for order in range(4)]
     table = [
