@@ -14,40 +14,22 @@ open-loop motion would damp it for nothing.  ``drag=0`` tells how little hangs o
 
 `Clairvoyant.verify` simulates the answer by another route, and `mpc.floor.certificate` proves it;
 the tests refine it on the nonlinear plant (`nonlinear_floor`).
-
-Solved records are cached on disk by the question that they answer.  Only the solver's answer is
-kept.  Whoever takes it out derives every number from it anew, its
-certificate included, so that an entry that is corrupt, foreign or out of date is found out and
-never believed.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import time as clock
-import warnings
-import zipfile
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
-from models.basics import (
-    FloatArray,
-    InputError,
-    check_choice,
-    check_range,
-    reason,
-    replace_atomically,
-)
+from models.basics import FloatArray, InputError, check_choice, check_range
 from models.case import Case
 from models.operation import Motion
 from models.plant import DriveLimits, PlantData, stochastic_equivalent
 
-from .certificate import certify, rollout
+from .certificate import rollout
 from .floor import Clairvoyant, Start, floor_of
 from .plant import HOLDS, Hold, RecordPlant, record_plant
 from .problem import RecordProblem, RecordSolution
@@ -59,10 +41,6 @@ _OWNER = "clairvoyant"
 _STARTS = ("free", "hook")
 _ROUNDS = 5  # of drag and motion
 _AGREED = 0.05  # relative change of the drag that ends them
-_SOUND = 1e-5  # excess over a limit of an entry of the cache that is believed
-
-FORMAT = 2  # of the entries; to be raised whenever the programme's meaning changes
-_ARRAYS = ("start", "inputs", "window_prices", "tension_prices")
 
 
 def clairvoyant(
@@ -77,7 +55,6 @@ def clairvoyant(
     minimum_tension: float | None = None,
     start: Start = "free",
     hold: Hold = "line",
-    cache: str | Path | None = None,
 ) -> Clairvoyant:
     """Return the floor of a record: the stillest payload with everything known in advance.
 
@@ -105,8 +82,6 @@ def clairvoyant(
     hold
         ``line``: a demand that is a straight line over each sample, the floor.  ``command``: a
         command that is held and keeps the limits at both ends, which the drive can follow.
-    cache
-        Folder in which answers are kept.
 
     Raises
     ------
@@ -114,11 +89,6 @@ def clairvoyant(
         If an argument is out of range, or record and sample time do not fit.
     SolverError
         If there is no motion within the limits, or the solver fails.
-
-    Warns
-    -----
-    RuntimeWarning
-        If an entry of the cache is not to be believed.
 
     Examples
     --------
@@ -158,24 +128,8 @@ def clairvoyant(
             start=None if start == "free" else _with_hook(plant, heave[0], rate[0]),
         )
 
-    posed, solution, iterations = problem(drag or 0.0), None, 0
-    key = ""
-    if cache is not None:
-        asked = {
-            "case": case.to_dict(),
-            "limits": repr(limits),
-            "options": [sample_time, settle, masses, drag, tension, start, hold],
-        }
-        key = fingerprint(asked, heave, rate, acceleration)
-        found = _from_cache(cache, key, problem)
-        if found is not None:
-            posed, solution = found
-    if solution is None:
-        posed, solution = _solved(posed, problem, case if drag is None else None)
-        iterations = solution.iterations
-        if cache is not None:
-            store_solution(cache, key, solution, posed.plant.drag)
-    return floor_of(case, limits, start, settle, posed, solution, iterations, began)
+    posed, solution = _solved(problem(drag or 0.0), problem, case if drag is None else None)
+    return floor_of(case, limits, start, settle, posed, solution, began)
 
 
 def _rows(record: Motion, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -221,90 +175,3 @@ def _solved(
         posed = problem(found)
         solution = solve_record(posed)
     return posed, solution
-
-
-def _from_cache(
-    cache: str | Path, key: str, problem: _Pose
-) -> tuple[RecordProblem, RecordSolution] | None:
-    """Return an entry that is there and optimal, as its certificate finds anew."""
-    found = stored_solution(cache, key)
-    if found is None:
-        return None
-    solution, drag = found
-    again = problem(drag)
-    excess = certify(again, solution).primal
-    if excess > _SOUND:
-        distrust(Path(cache), f"its motion exceeds a limit by {100 * excess:.2g} %")
-        return None
-    return again, solution
-
-
-def fingerprint(options: Mapping[str, Any], *arrays: FloatArray) -> str:
-    """Return a digest of everything that an answer hangs on."""
-    text = json.dumps({"format": FORMAT, **options}, sort_keys=True, default=repr)
-    digest = hashlib.sha256(text.encode())
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
-    return digest.hexdigest()[:40]
-
-
-def store_solution(folder: str | Path, key: str, solution: RecordSolution, drag: float) -> Path:
-    """Write an entry, whole or not at all.
-
-    Raises InputError if the folder cannot be made or written to.
-    """
-    path = _path(folder, key)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path.parent}: cannot be made: {reason(error)}") from error
-    values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}
-    values |= {"drag": drag, "iterations": solution.iterations, "seal": _seal(key, drag, solution)}
-
-    def write(place: Path) -> None:
-        with place.open("wb") as file:
-            np.savez(file, **values)
-
-    return replace_atomically(path, write)
-
-
-def stored_solution(folder: str | Path, key: str) -> tuple[RecordSolution, float] | None:
-    """Return the entry of a fingerprint and its drag, or None where there is none to trust.
-
-    Warns
-    -----
-    RuntimeWarning
-        If there is an entry that cannot be read or is not what its name says.
-    """
-    path = _path(folder, key)
-    if not path.exists():
-        return None
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            arrays = {name: np.array(data[name], dtype=np.float64) for name in _ARRAYS}
-            solution = RecordSolution(iterations=int(data["iterations"]), **arrays)
-            drag, seal = float(data["drag"]), str(data["seal"])
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        distrust(path, str(error))
-        return None
-    if seal != _seal(key, drag, solution):
-        distrust(path, "it was changed, or is the answer to something else")
-        return None
-    return solution, drag
-
-
-def distrust(path: Path, why: str) -> None:
-    """Warn of an entry that is put aside."""
-    warnings.warn(
-        f"{path}: not believed ({why}); the record is solved again", RuntimeWarning, stacklevel=2
-    )
-
-
-def _path(folder: str | Path, key: str) -> Path:
-    return Path(folder) / f"clairvoyant-{key}.npz"
-
-
-def _seal(key: str, drag: float, solution: RecordSolution) -> str:
-    """Return a digest of an entry and of the question that it answers."""
-    arrays = (getattr(solution, name) for name in _ARRAYS)
-    return fingerprint({"key": key, "drag": drag}, *arrays)

@@ -32,64 +32,36 @@ _AT_LIMIT = 1e-3  # closer to a limit than this share of it counts as at the lim
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clairvoyant(ReadOnlyArrays):
-    """The floor of a record, with the motion that reaches it.
-
-    Attributes
-    ----------
-    case, limits, hold, start, settle
-        The question: case, drive limits, what is held over a sample, where it starts, and the time
-        from which the payload counts [s].
-    payload_rms, payload_max
-        Root mean square and largest size of the payload's displacement [m].
-    hook_rms
-        Of the hook's over the same time [m].
-    lower_bound
-        Below this no controller gets on the linear plant, from the dual [m].
-    torque_peak, torque_rms, speed_peak, tension_least
-        Largest and root mean square motor torque [N m], highest motor speed [rad/s], smallest
-        tension of the lowest piece of rope [N].
-    shares
-        Share of the time at each limit: torque, speed, power, voltage, tension [-].
-    time, hook, payload, haul, torque, speed
-        At the samples, (N+1,) [s, m, m, m, N m, rad/s].
-    command
-        What a controller asks of the drive at the start of each sample, (N,) [unit of the command].
-    drag
-        Linear drag coefficient [N s/m].
-    iterations, seconds
-        Steps of the solver (0: from the cache), and the whole time taken [s].
-    certificate
-        Residuals of the optimality conditions, by code that did not solve it.
-    problem, solution
-        What was solved, and the solver's answer.
-    """
+    """The floor of a record, with the motion that reaches it."""
 
     case: Case
-    limits: DriveLimits
-    hold: Hold
-    start: Start
-    settle: float
-    payload_rms: float
-    payload_max: float
-    hook_rms: float
-    torque_peak: float
-    torque_rms: float
-    speed_peak: float
-    tension_least: float
+    limits: DriveLimits  #: Limits of the drive.
+    hold: Hold  #: What is held over a sample.
+    start: Start  #: Where it starts.
+    settle: float  #: Time from which the payload counts [s].
+    payload_rms: float  #: Root mean square of the payload's displacement [m].
+    payload_max: float  #: Its largest size [m].
+    hook_rms: float  #: Root mean square of the hook's over the same time [m].
+    torque_peak: float  #: Largest motor torque [N m].
+    torque_rms: float  #: Its root mean square [N m].
+    speed_peak: float  #: Highest motor speed [rad/s].
+    tension_least: float  #: Smallest tension of the lowest piece of rope [N].
+    #: Share of the time at each limit: torque, speed, power, voltage, tension [-].
     shares: Mapping[str, float]
-    time: FloatArray
-    hook: FloatArray
-    payload: FloatArray
-    haul: FloatArray
-    torque: FloatArray
-    speed: FloatArray
+    time: FloatArray  #: The samples, (N+1,) [s]; what follows is at them.
+    hook: FloatArray  #: [m]
+    payload: FloatArray  #: [m]
+    haul: FloatArray  #: [m]
+    torque: FloatArray  #: [N m]
+    speed: FloatArray  #: [rad/s]
+    #: Asked of the drive at the start of each sample, (N,) [unit of the command].
     command: FloatArray
-    drag: float
-    iterations: int
-    seconds: float
+    drag: float  #: Linear drag coefficient [N s/m].
+    seconds: float  #: Time taken [s].
+    #: Residuals of the optimality conditions, by code that did not solve it.
     certificate: Certificate
-    problem: RecordProblem = field(repr=False)
-    solution: RecordSolution = field(repr=False)
+    problem: RecordProblem = field(repr=False)  #: What was solved.
+    solution: RecordSolution = field(repr=False)  #: The solver's answer.
 
     def __post_init__(self) -> None:
         """Make arrays and mapping read-only."""
@@ -138,7 +110,7 @@ class Clairvoyant(ReadOnlyArrays):
             f"├ at limits: {at}\n"
             f"├ linear drag: {self.drag:.4g} N s/m; demand per sample: {self.hold}; "
             f"start: {self.start}\n"
-            f"└ solver: piqp, {self.iterations} steps; {self.certificate}"
+            f"└ solver: piqp, {self.solution.iterations} steps; {self.certificate}"
         )
 
 
@@ -149,7 +121,6 @@ def floor_of(
     settle: float,
     problem: RecordProblem,
     solution: RecordSolution,
-    iterations: int,
     began: float,
 ) -> Clairvoyant:
     """Return the numbers of an answer, begun at `began` by `time.perf_counter` [s].
@@ -200,7 +171,6 @@ def floor_of(
         speed=speed,
         command=plant.commands(states[:N], demand[:, 0]),
         drag=plant.drag,
-        iterations=iterations,
         seconds=clock.perf_counter() - began,
         certificate=certify(problem, solution),
         problem=problem,

@@ -1,8 +1,6 @@
 from __future__ import annotations
 
 import math
-import warnings
-from pathlib import Path
 
 import cvxpy as cp
 import numpy as np
@@ -13,7 +11,7 @@ from one_run import simulate
 import stillhook as sh
 from models.operation import Motion, SineMotion, SpectrumMotion
 from models.plant import DriveLimits
-from mpc.floor import Clairvoyant, clairvoyant
+from mpc.floor import clairvoyant
 from mpc.floor.certificate import certify, rollout
 from mpc.floor.plant import record_plant
 from mpc.floor.problem import RHO, RecordProblem
@@ -249,47 +247,6 @@ def test_settling_time_is_not_counted() -> None:
     whole = clairvoyant(case, record, drag=0.0)
     assert late.payload_rms <= np.sqrt(np.mean(whole.payload[400:] ** 2)) * (1.0 + 1e-9)
     assert late.payload_rms > whole.payload_rms  # the calm beginning is not counted
-
-
-def cached(folder: Path) -> Clairvoyant:
-    case = case_at(3.75)
-    return clairvoyant(case, record_of(case, 20.0, 3), drag=0.0, cache=folder)
-
-
-def test_the_cache_gives_the_same_answer_without_solving(tmp_path: Path) -> None:
-    first, second = cached(tmp_path / "new"), cached(tmp_path / "new")
-    assert first.iterations > 0
-    assert second.iterations == 0
-    assert second.payload_rms == first.payload_rms
-    assert second.certificate == first.certificate
-    assert [path.suffix for path in (tmp_path / "new").iterdir()] == [".npz"]
-
-
-@pytest.mark.parametrize("harm", ["cut", "noise", "foreign", "changed"])
-def test_a_bad_entry_of_the_cache_is_not_believed(tmp_path: Path, harm: str) -> None:
-    first = cached(tmp_path)
-    (path,) = tmp_path.iterdir()
-    if harm == "cut":
-        path.write_bytes(path.read_bytes()[:1000])
-    elif harm == "noise":
-        path.write_bytes(b"nothing of the kind")
-    elif harm == "foreign":
-        case = case_at(2.43)
-        clairvoyant(case, record_of(case, 20.0, 3), drag=0.0, cache=tmp_path / "other")
-        (other,) = (tmp_path / "other").iterdir()
-        path.write_bytes(other.read_bytes())
-    else:
-        with np.load(path) as data:
-            values = {name: data[name] for name in data.files}
-        values["inputs"] = 0.9 * values["inputs"]
-        np.savez(path, **values)
-    with pytest.warns(RuntimeWarning, match="not believed"):
-        again = cached(tmp_path)
-    assert again.iterations > 0
-    assert again.payload_rms == pytest.approx(first.payload_rms)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert cached(tmp_path).iterations == 0
 
 
 def test_records_may_be_finer_than_the_samples() -> None:
