@@ -62,23 +62,13 @@ _SIX_DOF = {"time": "time", "heave": "length", "roll": "angle", "pitch": "angle"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordMotion:
-    """A motion known by its displacement at equal time steps; `read` and `from_arrays` make it.
+    """A motion known by its displacement at equal time steps; `read` and `from_arrays` make it."""
 
-    Attributes
-    ----------
-    displacement, velocity, acceleration
-        At the samples (n,), n >= 8 [m], [m/s], [m/s2].
-    step
-        Time between samples [s].
-    description
-        Where it comes from.
-    """
-
-    displacement: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    step: float
-    description: str
+    displacement: FloatArray  #: At the samples (n,), n >= 8 [m].
+    velocity: FloatArray  #: [m/s]
+    acceleration: FloatArray  #: [m/s2]
+    step: float  #: Time between samples [s].
+    description: str  #: Where it comes from.
 
     @classmethod
     def read(

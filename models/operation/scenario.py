@@ -30,75 +30,45 @@ from .profile import Profile
 class Scenario:
     """An operation.
 
-    Attributes
-    ----------
-    name, description
-        What it is called, and what it is in one line.
-    duration
-        How long it takes unless the run says otherwise [s].
-    profile
-        What is asked of the payload.
-    warm_up
-        Time with the brake on, in which sensors and filters settle [s].
-    ramp
-        Time in which the controller's command is ramped in, and out [s].
-    settle
-        Time from which statistics of the run count [s].
-    disengage_at
-        When the controller begins to ramp out, after which the brake is set [s]; None: never.
-    brake_trips
-        Periods in which the brake is on although nobody asked for it [s].
-    worst_trip
-        (start, end, lasting) [s]: the brake is on for so long from the moment between start and
-        end at which the drum turns fastest, which each run finds in the same run without the
-        trip; None: never.
-    telemetry_outages, sensor_failures, mru_outages
-        Periods without messages from the payload, with a payload sensor that gives no numbers,
-        and without the motion reference unit [s].
-    telemetry_delays
-        (start, end, extra) [s]: messages that the payload sends in the period are late by so much
-        more.
-    mru_biases
-        (start, end, heave, rate) [s], [m], [m/s]: what the motion reference unit shows too much.
-    parameter_changes
-        New values of plant parameters by the time from which they hold [s] and by name; None
-        takes a parameter back to its own value.
-    surroundings
-        What the payload meets.
-    motions
-        Sources of the motions that the surroundings need: ``deck``, ``surface``.
-    initial_haul
-        Where the drum stands at the start, in metres of rope hauled in from where it holds the
-        submerged payload at P = 0; negative for a payload that stands, with slack rope.
-    case_changes
-        Fields of the case that belong to the operation, by dotted path: a lift in air has less
-        rope out and no water around it.
-
     Raises
     ------
     InputError
         If a time is out of order, or a motion is missing or not needed.
     """
 
-    name: str
-    description: str
-    duration: float
-    profile: Profile = field(default_factory=Profile)
-    warm_up: float = 0.0
-    ramp: float = 0.0
-    settle: float = 0.0
+    name: str  #: What it is called.
+    description: str  #: What it is, in one line.
+    duration: float  #: How long it takes unless the run says otherwise [s].
+    profile: Profile = field(default_factory=Profile)  #: What is asked of the payload.
+    warm_up: float = 0.0  #: Time with the brake on, in which sensors and filters settle [s].
+    ramp: float = 0.0  #: Time in which the controller's command is ramped in, and out [s].
+    settle: float = 0.0  #: Time from which statistics of the run count [s].
+    #: When the controller begins to ramp out, after which the brake is set [s].
     disengage_at: float | None = None
+    #: Periods in which the brake is on although nobody asked for it [s].
     brake_trips: tuple[Interval, ...] = ()
+    #: (start, end, lasting) [s]: the brake is on for so long from the moment between start and end
+    #: at which the drum turns fastest, which each run finds in the same run without the trip.
     worst_trip: tuple[float, float, float] | None = None
-    telemetry_outages: tuple[Interval, ...] = ()
+    telemetry_outages: tuple[Interval, ...] = ()  #: Periods without messages from the payload [s].
+    #: Periods with a payload sensor that gives no numbers [s].
     sensor_failures: tuple[Interval, ...] = ()
-    mru_outages: tuple[Interval, ...] = ()
+    mru_outages: tuple[Interval, ...] = ()  #: Periods without the motion reference unit [s].
+    #: (start, end, extra) [s]: messages sent in the period are late by so much more.
     telemetry_delays: tuple[Late, ...] = ()
+    #: (start, end, heave, rate) [s], [m], [m/s]: what the reference unit shows too much.
     mru_biases: tuple[Bias, ...] = ()
+    #: New values of plant parameters by the time from which they hold [s] and by name; None takes a
+    #: parameter back to its own value.
     parameter_changes: Mapping[float, Mapping[str, float | None]] = field(default_factory=dict)
-    surroundings: Surroundings | None = None
+    surroundings: Surroundings | None = None  #: What the payload meets.
+    #: Sources of the motions that the surroundings need: ``deck``, ``surface``.
     motions: Mapping[str, MotionSource] = field(default_factory=dict)
+    #: Where the drum stands at the start, in metres of rope hauled in from where it holds the
+    #: submerged payload at P = 0; negative for a payload that stands, with slack rope.
     initial_haul: float = 0.0
+    #: Fields of the case that belong to the operation, by dotted path: a lift in air has less rope
+    #: out and no water around it.
     case_changes: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

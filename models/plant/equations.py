@@ -38,37 +38,20 @@ MOTION = ("displacement", "velocity", "acceleration")  # of whatever else moves:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Equations:
-    """Symbolic functions of the plant, and the names of what goes in and out.
+    """Symbolic functions of the plant, and the names of what goes in and out."""
 
-    Parameters
-    ----------
-    data
-        The numbers it was built from.
-    lumps
-        The rope's lumping.
-    states, inputs, disturbances, measurements, outputs
-        Names of the entries of x, u, w, y and z.
-    parameters
-        Names and values of the entries of p.
-    function
-        casadi.Function (x, u, w, p) -> (xdot, y, z), smooth but for slack rope.
-    jacobians
-        (x, u, w, p) -> (A, B, E, C, D, F, Cz, Dz, Fz).
-    units
-        Unit of each signal by name.
-    """
-
-    data: PlantData
-    lumps: RopeLumps
-    inputs: tuple[str, ...] = INPUTS
-    measurements: tuple[str, ...] = MEASUREMENTS
-    states: tuple[str, ...]
-    disturbances: tuple[str, ...]
-    outputs: tuple[str, ...]
-    parameters: Mapping[str, float]
+    data: PlantData  #: The numbers it was built from.
+    lumps: RopeLumps  #: The rope's lumping.
+    inputs: tuple[str, ...] = INPUTS  #: Names of the entries of u.
+    measurements: tuple[str, ...] = MEASUREMENTS  #: Of y.
+    states: tuple[str, ...]  #: Of x.
+    disturbances: tuple[str, ...]  #: Of w.
+    outputs: tuple[str, ...]  #: Of z.
+    parameters: Mapping[str, float]  #: Names and values of the entries of p.
+    #: casadi.Function (x, u, w, p) -> (xdot, y, z), smooth but for slack rope.
     function: ca.Function
-    jacobians: ca.Function
-    units: Mapping[str, str]
+    jacobians: ca.Function  #: (x, u, w, p) -> (A, B, E, C, D, F, Cz, Dz, Fz).
+    units: Mapping[str, str]  #: Unit of each signal by name.
 
 
 def build_equations(

@@ -86,52 +86,25 @@ class Timings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """A simulated run.
+    """A simulated run."""
 
-    Attributes
-    ----------
-    case, controller, scenario, seed
-        What was simulated: the case, the controller's and the scenario's name, the seed.
-    sample_time
-        The controller's sample time [s].
-    step
-        The integration step [s].
-    duration
-        Simulated time that was asked for [s]; the run ends earlier if it did not complete.
-    compiled
-        Whether the loop ran as compiled C.
-    signals, units
-        Names of the columns of `values`, and their units.
-    time, values
-        Times from zero (n,) [s], and the signals at those times (n, signals).  The arrays are
-        taken, not copied, and can no longer be written to through the run.
-    statistics
-        Statistics of every sample, not only of those in `values`.
-    events
-        What happened, in the order of time.
-    status, message
-        "completed", "diverged", "interrupted" or another single word, and the sentence to read.
-    timings
-        How fast it was.
-    """
-
-    case: Case
-    controller: str
-    scenario: str
+    case: Case  #: What was simulated.
+    controller: str  #: Name of the controller.
+    scenario: str  #: Name of the scenario.
     seed: int
-    sample_time: float
-    step: float
-    duration: float
-    compiled: bool
-    signals: tuple[str, ...]
+    sample_time: float  #: The controller's sample time [s].
+    step: float  #: The integration step [s].
+    duration: float  #: Simulated time asked for [s]; the run ends earlier if it did not complete.
+    compiled: bool  #: Whether the loop ran as compiled C.
+    signals: tuple[str, ...]  #: Names of the columns of `values`.
     units: Mapping[str, str]
-    time: FloatArray
-    values: FloatArray
-    statistics: Statistics
-    events: tuple[Event, ...] = ()
-    status: str = "completed"
-    message: str = ""
-    timings: Timings
+    time: FloatArray  #: Times from zero (n,) [s], taken and not copied, like the values.
+    values: FloatArray  #: The signals at those times (n, signals).
+    statistics: Statistics  #: Statistics of every sample, not only of those in `values`.
+    events: tuple[Event, ...] = ()  #: What happened, in the order of time.
+    status: str = "completed"  #: "completed", "diverged", "interrupted" or another single word.
+    message: str = ""  #: The sentence to read.
+    timings: Timings  #: How fast it was.
 
     def __post_init__(self) -> None:
         """Make everything read-only."""

@@ -40,49 +40,30 @@ class Blocks(ReadOnlyArrays):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SignalStatistics:
-    """Statistics of one signal, in its unit u.
+    """Statistics of one signal, in its unit u."""
 
-    Attributes
-    ----------
-    name, unit
-        What it is called, and its unit u.
-    mean, standard_deviation, minimum, maximum
-        Over all samples counted [u]; the deviation has n, not n - 1, in its denominator.
-    minimum_time, maximum_time
-        When the extremes came first [s].
-    level
-        What the cycles are counted about [u]; NaN for a signal without cycles.
-    cycles
-        Number of whole cycles, from one up-crossing of the level to the next.
-    period
-        Their mean length [s]; NaN without cycles.
-    crest, trough, height
-        Highest crest and deepest trough (negative) of a cycle from the level, and the largest
-        double amplitude within one cycle [u].
-    significant
-        Mean height of the highest third of the cycles [u]; four standard deviations if there were
-        none, or too many to keep.
-    crests, troughs
-        Crest and trough of every cycle from the level (cycles,) [u], in single precision; empty
-        if they were too many to keep.
-    """
-
-    name: str
-    unit: str
-    mean: float
-    standard_deviation: float
-    minimum: float
-    minimum_time: float
-    maximum: float
-    maximum_time: float
+    name: str  #: What it is called.
+    unit: str  #: Its unit u.
+    mean: float  #: Over all samples counted [u].
+    standard_deviation: float  #: With n, not n - 1, in its denominator [u].
+    minimum: float  #: The least [u].
+    minimum_time: float  #: When it came first [s].
+    maximum: float  #: The largest [u].
+    maximum_time: float  #: When it came first [s].
+    #: What the cycles are counted about [u]; NaN for a signal without cycles.
     level: float = math.nan
-    cycles: int = 0
-    period: float = math.nan
-    crest: float = math.nan
-    trough: float = math.nan
-    height: float = math.nan
+    cycles: int = 0  #: Number of whole cycles, from one up-crossing of the level to the next.
+    period: float = math.nan  #: Their mean length [s]; NaN without cycles.
+    crest: float = math.nan  #: Highest crest of a cycle from the level [u].
+    trough: float = math.nan  #: Deepest trough (negative) from the level [u].
+    height: float = math.nan  #: The largest double amplitude within one cycle [u].
+    #: Mean height of the highest third of the cycles [u]; four standard deviations if there were
+    #: none, or too many to keep.
     significant: float = math.nan
+    #: Crest of every cycle from the level (cycles,) [u], in single precision; empty if they were
+    #: too many to keep.
     crests: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
+    #: The same of troughs.
     troughs: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
 
     @property

@@ -46,61 +46,34 @@ _OWNER = "predictive control"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SampledWinch(ReadOnlyArrays):
-    """Plant and sensors, sampled; `sampled_winch` makes it.
-
-    Attributes
-    ----------
-    case, plant
-        The case, and its linear plant with all sensors, in continuous time.
-    A, B, from_hook, from_constants
-        (n, n), (n, 1), (n, 4), (n, 2).
-    payload, velocity, speed, tension
-        Rows of the payload's displacement [m] and velocity [m/s], the motor's speed [rad/s] and the
-        tension at the payload [N], of the state, (n,).
-    tension_from_hook, tension_from_constants
-        Shares of (z, z') and of the constants in that tension, (2,) each.
-    force_felt
-        What the payload's sensors show at once of a force on it, per newton, (3,).
-    moved
-        State of a plant whose load is off by one metre, and of one that moves at one metre per
-        second, drum and payload alike, (n, 2).
-    gain, back
-        Torque per command, and command per speed.
-    rest_command, rest_torque, rest_tension
-        What holds the load [unit of the command], [N m], [N].
-    sample_time
-        T [s].
-    masses
-        Masses along the rope.
-    data
-        Numbers of the plant.
-    drag
-        Linear drag coefficient of the payload in A [N s/m].
-    """
+    """Plant and sensors, sampled; `sampled_winch` makes it."""
 
     case: Case
-    data: PlantData
-    plant: LinearPlant
-    A: FloatArray
-    B: FloatArray
-    from_hook: FloatArray
-    from_constants: FloatArray
-    payload: FloatArray
-    velocity: FloatArray
-    speed: FloatArray
-    tension: FloatArray
-    tension_from_hook: FloatArray
-    tension_from_constants: FloatArray
+    data: PlantData  #: Numbers of the plant.
+    plant: LinearPlant  #: The linear plant of the case with all sensors, in continuous time.
+    A: FloatArray  #: (n, n)
+    B: FloatArray  #: (n, 1)
+    from_hook: FloatArray  #: (n, 4)
+    from_constants: FloatArray  #: (n, 2)
+    payload: FloatArray  #: Row of the payload's displacement [m], of the state, (n,).
+    velocity: FloatArray  #: Of its velocity [m/s].
+    speed: FloatArray  #: Of the motor's speed [rad/s].
+    tension: FloatArray  #: Of the tension at the payload [N].
+    tension_from_hook: FloatArray  #: Shares of (z, z') in that tension, (2,).
+    tension_from_constants: FloatArray  #: Shares of the constants in it, (2,).
+    #: What the payload's sensors show at once of a force on it, per newton, (3,).
     force_felt: FloatArray
+    #: State of a plant whose load is off by one metre, and of one that moves at one metre per
+    #: second, drum and payload alike, (n, 2).
     moved: FloatArray
-    gain: float
-    back: float
-    rest_command: float
-    rest_torque: float
-    rest_tension: float
-    sample_time: float
-    masses: int
-    drag: float
+    gain: float  #: Torque per command.
+    back: float  #: Command per speed.
+    rest_command: float  #: What holds the load [unit of the command].
+    rest_torque: float  #: [N m]
+    rest_tension: float  #: [N]
+    sample_time: float  #: T [s].
+    masses: int  #: Masses along the rope.
+    drag: float  #: Linear drag coefficient of the payload in A [N s/m].
 
     @property
     def dc(self) -> bool:

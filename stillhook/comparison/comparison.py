@@ -80,41 +80,22 @@ _MEANS = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """What contenders came to.
+    """What contenders came to."""
 
-    Attributes
-    ----------
-    case
-        The case that they were made for.
-    contenders, heights, seeds
-        Who took part, in seas of which significant height [m], and with which seeds.
-    question
-        What all were asked.
-    cells
-        One for each run.
-    refused
-        Why a contender did not take part in seas of a height, by name and height.
-    laws
-        Designs by contender and height.
-    traces
-        Time traces of the worst moment, one for each contender that has any.
-    complete
-        Whether every run was made; False after Ctrl-C.
-    seconds
-        Time that it took [s].
-    """
-
-    case: Case
-    contenders: tuple[Contender, ...]
-    heights: tuple[float, ...]
+    case: Case  #: The case that they were made for.
+    contenders: tuple[Contender, ...]  #: Who took part.
+    heights: tuple[float, ...]  #: Significant heights of the seas [m].
     seeds: tuple[int, ...]
-    question: ComparisonQuestion
-    cells: tuple[Cell, ...]
+    question: ComparisonQuestion  #: What all were asked.
+    cells: tuple[Cell, ...]  #: One for each run.
+    #: Why a contender did not take part in seas of a height, by name and height.
     refused: Mapping[tuple[str, float], str] = field(default_factory=dict)
+    #: Designs by contender and height.
     laws: Mapping[tuple[str, float], StoredDesign] = field(default_factory=dict)
+    #: Time traces of the worst moment, one for each contender that has any.
     traces: tuple[Trace, ...] = ()
-    complete: bool = True
-    seconds: float = math.nan
+    complete: bool = True  #: Whether every run was made; False after Ctrl-C.
+    seconds: float = math.nan  #: Time that it took [s].
 
     @cached_property
     def _groups(self) -> dict[tuple[str, float], list[Cell]]:

@@ -33,56 +33,28 @@ _BROKEN = 1.01  # a limit that is exceeded by more, at the highest multipliers, 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bound:
-    """A lower bound, with the question that it answers and the controller that comes next to it.
+    """A lower bound, with the question that it answers and the controller that comes next to it."""
 
-    Attributes
-    ----------
-    plant
-        The plant with its exact delays.
-    sources
-        The disturbances and their true spectra.
-    minimise, limits
-        Weights on variances, and limits on rms values by name of an output or input.
-    value
-        No linear controller that keeps the limits has a smaller root of the weighted variance;
-        infinity if none can keep them.
-    multipliers, prices
-        Of the limits by name: per squared unit, and as the share of the bound's variance that
-        one percent on the limit's rms is worth, times 100.
-    attained
-        Root of the weighted variance of the controller found, on the true spectra and delays.
-    rms
-        Of what is limited, with that controller.
-    gap
-        Duality gap of the model over its variance.
-    missed
-        What fit and Pade model cost the bound, over the attained variance.
-    fits
-        L1 error of each fitted spectrum over its variance.
-    controller
-        The LQG controller of the model, full order, u = +C y.
-    point, dual, pade
-        The optimum of the rational model.
-    assumptions
-        What the figure holds for, in words.
-    """
-
-    plant: LinearPlant
-    sources: tuple[Disturbance, ...]
-    minimise: Mapping[str, float]
-    limits: Mapping[str, float]
+    plant: LinearPlant  #: The plant with its exact delays.
+    sources: tuple[Disturbance, ...]  #: The disturbances and their true spectra.
+    minimise: Mapping[str, float]  #: Weights on variances.
+    limits: Mapping[str, float]  #: Limits on rms values by name of an output or input.
+    #: No linear controller that keeps the limits has a smaller root of the weighted variance;
+    #: infinity if none can keep them.
     value: float
-    multipliers: Mapping[str, float]
+    multipliers: Mapping[str, float]  #: Of the limits by name, per squared unit.
+    #: The share of the bound's variance that one percent on the limit's rms is worth, times 100.
     prices: Mapping[str, float]
+    #: Root of the weighted variance of the controller found, on the true spectra and delays.
     attained: float
-    rms: Mapping[str, float]
-    gap: float
-    missed: float
-    fits: Mapping[str, float]
-    controller: LinearController
+    rms: Mapping[str, float]  #: Of what is limited, with that controller.
+    gap: float  #: Duality gap of the model over its variance.
+    missed: float  #: What fit and Pade model cost the bound, over the attained variance.
+    fits: Mapping[str, float]  #: L1 error of each fitted spectrum over its variance.
+    controller: LinearController  #: The LQG controller of the model, full order, u = +C y.
     pade: int
-    assumptions: tuple[str, ...]
-    point: DualPoint = field(repr=False)
+    assumptions: tuple[str, ...]  #: What the figure holds for, in words.
+    point: DualPoint = field(repr=False)  #: The optimum of the rational model.
     dual: Dual = field(repr=False)
     filters: Mapping[str, ShapingFilter | float] = field(repr=False)
 

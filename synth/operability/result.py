@@ -34,25 +34,15 @@ _CHECKS = 3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Operability:
-    """Limiting significant heights over peak period and heading.
+    """Limiting significant heights over peak period and heading."""
 
-    Attributes
-    ----------
-    case, design
-        What was asked about; no design where a case was.
-    depths
-        The contours at each length of rope asked for, or at the case's own alone.
-    scatter
-        The scatter diagram, if there is one.
-    wanted
-        The criteria on the payload's motion; without any the limits are those of the drive and
-        the rope alone.
-    """
-
-    case: Case
-    design: Design | None
+    case: Case  #: What was asked about.
+    design: Design | None  #: None where a case was.
+    #: The contours at each length of rope asked for, or at the case's own alone.
     depths: tuple[AtDepth, ...]
-    scatter: Scatter | None
+    scatter: Scatter | None  #: The scatter diagram, if there is one.
+    #: The criteria on the payload's motion; without any the limits are those of the drive and the
+    #: rope alone.
     wanted: tuple[Limit, ...]
 
     @property

@@ -54,47 +54,29 @@ _PADE = 8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robustness:
-    """What uncertain parameters do to a design's stability.
+    """What uncertain parameters do to a design's stability."""
 
-    Attributes
-    ----------
-    ranges
-        What is uncertain, by path: least and largest value.
-    found
-        The least factor on the ranges at which unstable parameters were found; infinity if there
-        were none up to `asked`.
-    asked
-        The largest factor that was looked at: `FURTHEST`, or less where values beyond it make no
-        case.
-    critical
-        Those parameters by path; empty if none were found.
-    omega, growth
-        Where the pole crosses the axis [rad/s], and its real part just beyond [1/s].
-    confirmed
-        Whether the true plant, built anew and with exact delays, is unstable just beyond them,
-        by its poles and by the winding number; None if none were found.
-    stable
-        Share of random draws within the least of `found` and 1 times the ranges, every other one
-        in a corner, that is stable; None without draws.
-    payload_rms, worst_rms
-        Payload rms of the design, and the largest of the stable draws [m].
-    gain_radius, margins
-        How far the gains themselves may be off, exactly (None where the loop is not affine in
-        them), and the margins of the nominal loop.
-    """
-
+    #: What is uncertain, by path: least and largest value.
     ranges: Mapping[str, tuple[float, float]]
+    #: The least factor on the ranges at which unstable parameters were found; infinity if there
+    #: were none up to `asked`.
     found: float
+    #: The largest factor looked at: `FURTHEST`, or less where values beyond it make no case.
     asked: float
-    critical: Mapping[str, float]
-    omega: float
-    growth: float
+    critical: Mapping[str, float]  #: Those parameters by path; empty if none were found.
+    omega: float  #: Where the pole crosses the axis [rad/s].
+    growth: float  #: Its real part just beyond [1/s].
+    #: Whether the true plant, built anew and with exact delays, is unstable just beyond them, by
+    #: its poles and by the winding number; None if none were found.
     confirmed: bool | None
+    #: Share of random draws within the least of `found` and 1 times the ranges, every other one in
+    #: a corner, that is stable; None without draws.
     stable: Share | None
-    payload_rms: float
-    worst_rms: float
+    payload_rms: float  #: Of the design [m].
+    worst_rms: float  #: The largest of the stable draws [m].
+    #: How far the gains themselves may be off, exactly; None where the loop is not affine in them.
     gain_radius: GainRadius | None
-    margins: Margins
+    margins: Margins  #: Of the nominal loop.
 
     @property
     def ok(self) -> bool:

@@ -65,31 +65,19 @@ class Moved:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivity:
-    """What matters most to a design; `sensitivity` makes it.
+    """What matters most to a design; `sensitivity` makes it."""
 
-    Attributes
-    ----------
-    design
-        The design asked about.
-    payload_rms, max_sensitivity, torque_rms, speed_rms
-        Its figures [m], [-], [N m], [rad/s].
-    elasticities
-        One for every number that has any effect (two at a corner, one for each side), that with
-        the largest effect on the payload's rms first.
-    without_effect
-        Paths of the numbers that do nothing to these figures.
-    stepping
-        Paths of numbers at which something steps, as the drum's radius does where one more turn
-        of a thinner rope fits into a layer: they have no elasticity there.
-    """
-
-    design: Design
-    payload_rms: float
-    max_sensitivity: float
-    torque_rms: float
-    speed_rms: float
+    design: Design  #: The design asked about.
+    payload_rms: float  #: Its figures: [m]
+    max_sensitivity: float  #: [-]
+    torque_rms: float  #: [N m]
+    speed_rms: float  #: [rad/s]
+    #: One for every number that has any effect (two at a corner, one for each side), that with the
+    #: largest effect on the payload's rms first.
     elasticities: tuple[Elasticity, ...]
-    without_effect: tuple[str, ...]
+    without_effect: tuple[str, ...]  #: Paths of the numbers that do nothing to these figures.
+    #: Paths of numbers at which something steps, as the drum's radius does where one more turn of a
+    #: thinner rope fits into a layer: they have no elasticity there.
     stepping: tuple[str, ...] = ()
 
     def __getitem__(self, path: str) -> Elasticity:

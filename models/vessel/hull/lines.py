@@ -40,17 +40,6 @@ _ENTRANCE = (0.04, 1.0 / (1.0 + _RUN))  # over the ship's length, shortest and l
 class ShipLines:
     """Main dimensions of a simple ship.
 
-    Attributes
-    ----------
-    length, beam, draught
-        Of the waterline, and down to the keel [m].
-    block
-        Block coefficient: displaced volume over length x beam x draught [-].
-    midship
-        Area of the midship section over beam x draught [-].
-    transom_width, transom_depth
-        Of the transom, over beam and draught [-]; no width: a stern as sharp as the bow.
-
     Raises
     ------
     InputError
@@ -68,13 +57,14 @@ class ShipLines:
     6048.0
     """
 
-    length: float
-    beam: float
-    draught: float
-    block: float = 0.70
-    midship: float = 0.96
+    length: float  #: Of the waterline [m].
+    beam: float  #: Of the waterline [m].
+    draught: float  #: Down to the keel [m].
+    block: float = 0.70  #: Block coefficient: displaced volume over length x beam x draught [-].
+    midship: float = 0.96  #: Area of the midship section over beam x draught [-].
+    #: Of the transom, over the beam [-]; none: a stern as sharp as the bow.
     transom_width: float = 0.9
-    transom_depth: float = 0.3
+    transom_depth: float = 0.3  #: Of the transom, over the draught [-].
 
     def __post_init__(self) -> None:
         """Check each dimension."""
