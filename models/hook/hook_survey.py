@@ -118,7 +118,6 @@ def hook_motion(
     headings: Sequence[float] | None = None,
     peak_periods: Sequence[float] | None = None,
     fractile: float = 0.9,
-    both_sides: bool = True,
 ) -> HookSurvey:
     """Return the hook's motion over headings, peak periods and both sides of the ship.
 
@@ -134,8 +133,6 @@ def hook_motion(
         measured one, a sum) is taken as it is.
     fractile
         Probability of the second extreme value, beside the most probable one.
-    both_sides
-        Whether to look across the ship too.
 
     Returns
     -------
@@ -172,7 +169,7 @@ def hook_motion(
             raise InputError("hook: headings must be at least one angle [deg]")
         angles, place = np.radians(asked), case.vessel.hook_point
         assert place is not None  # the section's own check
-        sides = (place, across(place)) if both_sides and abs(place[1]) > 1e-9 else (place,)
+        sides = (place, across(place)) if abs(place[1]) > 1e-9 else (place,)
         waves = _Waves.of(seas, vessel_raos(case.vessel, case.label).omega)
         table = np.array([[_point(case, waves, side, angle) for angle in angles] for side in sides])
     return HookSurvey(

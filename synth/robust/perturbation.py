@@ -57,18 +57,13 @@ class GainRadius:
 
 
 def gain_radius(
-    plant: LinearPlant,
-    law: ParametrisedController,
-    values: Sequence[float],
-    names: Sequence[str] | None = None,
+    plant: LinearPlant, law: ParametrisedController, values: Sequence[float]
 ) -> GainRadius:
-    """Return how much the gains of a stable loop may be off.
+    """Return how much the gains of a stable loop may be off: all in which it is affine.
 
-    The plant has one input; with quadratic drag it is at the drag of the design.  Without names it
-    is all parameters in which the loop is affine.
+    The plant has one input; with quadratic drag it is at the drag of the design.
 
-    Raises InputError if the plant has several inputs, the loop is unstable, or it is not affine in
-    `names`.
+    Raises InputError if the plant has several inputs, or the loop is unstable or affine in none.
     """
     if len(plant.inputs) != 1:
         raise InputError(f"gain radius: the plant must have one input, got {len(plant.inputs)}")
@@ -77,17 +72,9 @@ def gain_radius(
     if float(poles.real.max(initial=-1.0)) >= 0.0:
         raise InputError("gain radius: the loop must be stable with the gains given")
     known = [p.name for p in law.parameters]
-    chosen = known if names is None else list(names)
-    unknown = sorted(set(chosen) - set(known))
-    if unknown:
-        raise InputError(f"gain radius: there is no parameter {unknown[0]!r}; there are: {known}")
-    index = [known.index(name) for name in chosen]
-    if names is None:
-        index = [k for k in index if given[k] != 0.0 and _is_affine(law, given, k, poles)]
-        if len(index) > 1 and not _is_affine(law, given, index, poles):
-            index = index[:1]
-    elif not _is_affine(law, given, index, poles):
-        raise InputError(f"gain radius: the loop is not affine in {', '.join(chosen)}")
+    index = [k for k in range(len(known)) if given[k] != 0.0 and _is_affine(law, given, k, poles)]
+    if len(index) > 1 and not _is_affine(law, given, index, poles):
+        index = index[:1]
     if not index:
         raise InputError("gain radius: the loop is affine in none of its parameters")
     curve = _Curve(plant, law, given, index)

@@ -194,8 +194,6 @@ def frequency_sweep(
     metrics: Sequence[str] | None = None,
     chunk: int | None = None,
     progress: Progress | None = None,
-    accuracy: float = ACCURACY,
-    nodes: Quadrature | None = None,
 ) -> xr.Dataset:
     """Return what a spread does to a design: one case after the other along "case".
 
@@ -220,8 +218,6 @@ def frequency_sweep(
         Cases at once; memory beyond the dataset's own is that of a chunk.
     progress
         Called as progress(stage, done, total).
-    accuracy, nodes
-        See `FrequencyEngine`.
 
     Returns
     -------
@@ -236,7 +232,7 @@ def frequency_sweep(
     """
     import xarray as xr
 
-    engine = FrequencyEngine(design, spread, metrics=metrics, accuracy=accuracy, nodes=nodes)
+    engine = FrequencyEngine(design, spread, metrics=metrics)
     parts = list(
         engine.chunks(samples=samples, sampling=sampling, seed=seed, chunk=chunk, progress=progress)
     )
