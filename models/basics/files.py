@@ -13,8 +13,7 @@ from pathlib import Path
 from .checks import InputError
 
 _LARGEST = 500_000_000  # bytes: what still fits in memory several times over
-GZIP = b"\x1f\x8b"
-"""How a file that is packed with gzip begins."""
+GZIP = b"\x1f\x8b"  #: How a file that is packed with gzip begins.
 
 
 def file_stamp(path: str | Path) -> tuple[int, int]:

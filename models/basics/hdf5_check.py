@@ -13,8 +13,7 @@ from pathlib import Path
 
 from .checks import InputError
 
-HDF5 = b"\x89HDF\r\n\x1a\n"
-"""How an HDF5 file begins."""
+HDF5 = b"\x89HDF\r\n\x1a\n"  #: How an HDF5 file begins.
 
 _SECONDS = 10.0
 _BYTES_PER_SECOND = 5e6  # of patience with a large file

@@ -23,8 +23,7 @@ from .quadrature import Quadrature
 
 Density = Callable[[FloatArray], npt.ArrayLike]
 
-THREE_HOURS = 10800.0
-"""The usual exposure of a sea state [s]."""
+THREE_HOURS = 10800.0  #: The usual exposure of a sea state [s].
 
 _HOOK, _HELD = "the hook's motion", "the payload's with the drum held"
 

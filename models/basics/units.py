@@ -22,14 +22,10 @@ from .checks import InputError
 class Kind:
     """What a field wants: its name in a sentence, its SI unit and the units it accepts."""
 
-    label: str
-    """With its article, as in `a length`."""
-    unit: str
-    """The SI unit that a plain number is in; empty for a pure number."""
-    units: Mapping[str, float]
-    """Accepted spellings and the factor that turns them into SI."""
-    decibel: bool = False
-    """Whether `dB` is accepted, as 20 log10 of an amplitude ratio."""
+    label: str  #: With its article, as in `a length`.
+    unit: str  #: The SI unit that a plain number is in; empty for a pure number.
+    units: Mapping[str, float]  #: Accepted spellings and the factor that turns them into SI.
+    decibel: bool = False  #: Whether `dB` is accepted, as 20 log10 of an amplitude ratio.
 
 
 def _kind(label: str, unit: str, units: Mapping[str, float], decibel: bool = False) -> Kind:

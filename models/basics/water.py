@@ -13,11 +13,9 @@ import numpy.typing as npt
 
 from .arrays import FloatArray
 
-GRAVITY = 9.80665
-"""Standard gravity [m/s2]."""
+GRAVITY = 9.80665  #: Standard gravity [m/s2].
 
-SEA_WATER_DENSITY = 1025.0
-"""Density of sea water [kg/m3]."""
+SEA_WATER_DENSITY = 1025.0  #: Density of sea water [kg/m3].
 
 
 def wave_frequency(number: npt.ArrayLike, depth: float = math.inf) -> FloatArray:

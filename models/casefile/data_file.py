@@ -18,8 +18,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from ..basics import InputError
 
-FOLDER = "folder"
-"""Key of the case file's folder in pydantic's validation context."""
+FOLDER = "folder"  #: Key of the case file's folder in pydantic's validation context.
 
 
 @dataclass(frozen=True)

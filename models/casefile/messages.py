@@ -9,8 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping, Sequence
 
-Path = tuple[str | int, ...]
-"""Way to a field: keys, and indices of lists."""
+Path = tuple[str | int, ...]  #: Way to a field: keys, and indices of lists.
 
 
 def message_line(source: str, line: int, path: Path, text: str) -> str:

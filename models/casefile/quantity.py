@@ -22,21 +22,14 @@ from ..basics import KINDS, InputError, range_text, read_quantity, units_of
 class Quantity:
     """A quantity of one kind within a range, as metadata of an annotated field."""
 
-    kind: str
-    """A key of `models.basics.units.KINDS`."""
-    low: float = -math.inf
-    """Smallest value allowed [SI]."""
-    high: float = math.inf
-    """Largest value allowed [SI]."""
+    kind: str  #: A key of `models.basics.units.KINDS`.
+    low: float = -math.inf  #: Smallest value allowed [SI].
+    high: float = math.inf  #: Largest value allowed [SI].
     _: KW_ONLY
-    open_low: bool = False
-    """Whether `low` itself is refused."""
-    open_high: bool = False
-    """Whether `high` itself is refused."""
-    word: str = ""
-    """A word that is accepted instead of a quantity, such as `auto`."""
-    unit: str = ""
-    """The unit to show for a pure number, such as `m/m`."""
+    open_low: bool = False  #: Whether `low` itself is refused.
+    open_high: bool = False  #: Whether `high` itself is refused.
+    word: str = ""  #: A word that is accepted instead of a quantity, such as `auto`.
+    unit: str = ""  #: The unit to show for a pure number, such as `m/m`.
 
     @property
     def wanted(self) -> str:

@@ -21,8 +21,7 @@ from ..basics import InputError
 from .messages import Path, line_of, message_line, suggestion
 from .quantity import Quantity
 
-TAGS = ("type", "method", "spectrum")
-"""Fields that select a section among its alternatives."""
+TAGS = ("type", "method", "spectrum")  #: Fields that select a section among its alternatives.
 
 
 class Section(BaseModel):

@@ -22,8 +22,7 @@ from .messages import Path, message_line
 _DEEPEST = 20
 """Nesting at which reading stops: a case has five levels; an alias may refer to itself."""
 
-_MOST = 100_000
-"""Number of nodes at which reading stops: aliases of aliases grow without bound."""
+_MOST = 100_000  #: Number of nodes at which reading stops: aliases of aliases grow without bound.
 
 
 def read_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:

@@ -34,8 +34,7 @@ from ..case import Case
 from ..hook import HookMotion
 from .hermite import MotionBlock, interpolated
 
-HOOK = None
-"""Purpose of a random motion that is drawn with the run's own seed."""
+HOOK = None  #: Purpose of a random motion that is drawn with the run's own seed.
 SECOND_BODY, SURFACE = 4, 5
 """Purposes of motions in waves of their own; `models.sensing.draws` has 1 to 3 and 7 to 9."""
 

@@ -22,8 +22,7 @@ from ..casefile import Quantity, suggestion
 from ..plant import DriveLimits
 from .scenario import Scenario
 
-PREFIX = "fault."
-"""What the path of a fault begins with."""
+PREFIX = "fault."  #: What the path of a fault begins with.
 
 
 @dataclass(frozen=True)
@@ -31,10 +30,8 @@ class FaultField(Quantity):
     """One number of a fault, of a kind and in a range."""
 
     _: KW_ONLY
-    nominal: float = 0.0
-    """Its value where nothing is said: none of the faults, or the usual time."""
-    text: str
-    """What it is."""
+    nominal: float = 0.0  #: Its value where nothing is said: none of the faults, or the usual time.
+    text: str  #: What it is.
 
 
 _LONG = 86400.0

@@ -19,8 +19,7 @@ from ..case import Case
 from ..casefile import Quantity
 from .profile import Move, Profile
 
-Values: TypeAlias = Mapping[str, Any]
-"""Values of a scenario's options by name, in SI."""
+Values: TypeAlias = Mapping[str, Any]  #: Values of a scenario's options by name, in SI.
 
 Default: TypeAlias = float | Callable[[Case], float]
 

@@ -28,8 +28,7 @@ from ..basics import THREE_HOURS, FloatArray, InputError, check_finite, peak_fac
 from .run import Run
 from .summary import SignalStatistics, Statistics
 
-FEWEST_MAXIMA = 8
-"""Fewer block maxima than this say nothing about a law of two parameters."""
+FEWEST_MAXIMA = 8  #: Fewer block maxima than this say nothing about a law of two parameters.
 
 
 @dataclass(frozen=True, kw_only=True)

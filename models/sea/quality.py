@@ -19,20 +19,16 @@ from ..basics import FloatArray
 
 TimeArray = npt.NDArray[np.datetime64]
 
-HIGHEST_SEA = 30.0
-"""H_s above which a record is rejected [m]; the highest on record is 19 m."""
+HIGHEST_SEA = 30.0  #: H_s above which a record is rejected [m]; the highest on record is 19 m.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rejection:
     """Records that were rejected for one reason."""
 
-    reason: str
-    """Why, as a sentence without its end."""
-    count: int
-    """How many records."""
-    example: str
-    """The first of them: its line, or its time."""
+    reason: str  #: Why, as a sentence without its end.
+    count: int  #: How many records.
+    example: str  #: The first of them: its line, or its time.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

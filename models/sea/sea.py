@@ -49,8 +49,7 @@ STANDARD_SPECTRA = (
 )  # fmt: skip
 """The standard forms by their names in a case file."""
 
-SPECTRA = (*STANDARD_SPECTRA, "measured", "sum")
-"""All spectra by their names in a case file."""
+SPECTRA = (*STANDARD_SPECTRA, "measured", "sum")  #: All spectra by their names in a case file.
 
 FIELDS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(STANDARD_SPECTRA, ("peak_period",)),

@@ -29,8 +29,7 @@ import numpy.typing as npt
 
 from ..basics import FloatArray, InputError, check_choice, check_range
 
-SPREADINGS = ("cos-2s", "cos-n")
-"""The spreading laws by their names in a case file."""
+SPREADINGS = ("cos-2s", "cos-n")  #: The spreading laws by their names in a case file.
 
 # With so many nodes every harmonic of the heading up to the 24th is integrated to 1e-9 at any
 # exponent; the square of a motion has harmonics up to about four times the wave number times the

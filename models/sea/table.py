@@ -20,8 +20,7 @@ from ..basics import FloatArray, InputError, ascending_fault, check_choice, chec
 BEYOND = ("decay", "zero")
 """What a measured spectrum may be above its last row: falling with omega^-5, or zero."""
 
-MOST_ROWS = 1000
-"""Rows that a table may have: each one begins a panel of every quadrature."""
+MOST_ROWS = 1000  #: Rows that a table may have: each one begins a panel of every quadrature.
 
 _TAIL_END = 60.0
 

@@ -35,8 +35,7 @@ from ..plant import PlantData
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-SET_POINT = "drive.set_point"
-"""The disturbance that stands for it, on the drive's command."""
+SET_POINT = "drive.set_point"  #: The disturbance that stands for it, on the drive's command.
 
 _STEP, _COUNT = 0.02, 2**16  # of the autocorrelation [s]
 #: Band that holds the variance [rad/s]: a slow drum drifts for as long as it likes.

@@ -38,8 +38,7 @@ class Distribution(ABC):
     """How one number is distributed."""
 
     name: ClassVar[str]
-    widths: ClassVar[tuple[str, ...]] = ()
-    """The fields that are distances; the others are places."""
+    widths: ClassVar[tuple[str, ...]] = ()  #: The fields that are distances; the others are places.
 
     def __post_init__(self) -> None:
         if self.numeric:

@@ -17,8 +17,7 @@ from ..basics import ComplexArray, FloatArray, InputError
 from .raos import VesselRaos
 from .symmetry import completed, looks_symmetric
 
-MOST_ROWS = 2_000_000
-"""Most cells of a table, frequencies times headings."""
+MOST_ROWS = 2_000_000  #: Most cells of a table, frequencies times headings.
 
 _SAME_FREQUENCY = 1e-9  # relative
 _SAME_HEADING = 1e-7  # rad

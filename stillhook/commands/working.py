@@ -35,8 +35,7 @@ from ..text import (
 
 _NAMED = 3  # pictures that are named
 
-Stop = Callable[[], bool]
-"""Whether the user has asked to stop."""
+Stop = Callable[[], bool]  #: Whether the user has asked to stop.
 
 
 @contextlib.contextmanager

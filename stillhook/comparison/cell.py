@@ -42,8 +42,7 @@ TRACED = (
 )
 """Signals that are kept around the worst moment."""
 
-WINDOW = 60.0
-"""Time that is kept around the worst moment [s]."""
+WINDOW = 60.0  #: Time that is kept around the worst moment [s].
 
 _ROUNDING = 1e-6  # of a limit that counts as broken
 _SAMPLE = 0.05  # of the floor's demand, which may bend in any way from one to the next [s]

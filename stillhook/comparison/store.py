@@ -13,8 +13,7 @@ from ..keeper import Journal, versions
 from .bench import CellBench
 from .cell import Cell, ComparisonQuestion
 
-STORE = "cells.jsonl"
-"""Name of the file in the folder of a comparison."""
+STORE = "cells.jsonl"  #: Name of the file in the folder of a comparison.
 
 
 def question_of(question: ComparisonQuestion) -> dict[str, Any]:

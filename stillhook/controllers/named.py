@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from synth.design import Design, Tuning
     from synth.loop import LinearController
 
-PROTOCOL = ("name", "sample_time", "reset", "step")
-"""What a controller has."""
+PROTOCOL = ("name", "sample_time", "reset", "step")  #: What a controller has.
 
 _FEEDBACK_SAMPLE = 0.01  # of a design, unless told otherwise [s]
 

@@ -25,10 +25,8 @@ from synth.question import controller_for
 if TYPE_CHECKING:
     from ..text import Progress
 
-EAGER = "-eager"
-"""Ending of the designs that ignore the drive's limits."""
-HALF = "-half"
-"""Ending of the designs that keep them in a sea of half the height."""
+EAGER = "-eager"  #: Ending of the designs that ignore the drive's limits.
+HALF = "-half"  #: Ending of the designs that keep them in a sea of half the height.
 
 
 @dataclass(frozen=True, kw_only=True)

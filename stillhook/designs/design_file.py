@@ -26,8 +26,7 @@ from synth.design import Design
 from synth.question import PAYLOAD, controller_for, difference_text
 from synth.verify import Verification
 
-FORMAT = 2
-"""Version of the file's format."""
+FORMAT = 2  #: Version of the file's format.
 
 _KEY, _STRUCTURE = "stillhook_design", "stillhook_structure"
 _WRITER = "written_by"

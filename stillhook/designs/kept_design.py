@@ -27,8 +27,7 @@ from .design_file import load_design, save_design
 if TYPE_CHECKING:
     from ..text import Progress
 
-KEPT = 64
-"""How many designs are kept; those longest unused go first."""
+KEPT = 64  #: How many designs are kept; those longest unused go first.
 
 
 def best_design(

@@ -22,8 +22,7 @@ from typing import Any, BinaryIO
 
 from models.basics import InputError
 
-FORMAT = 2
-"""Version of what stands in a line."""
+FORMAT = 2  #: Version of what stands in a line.
 
 _BEGIN = b'{"crc": '
 _LINE = re.compile(rb'\{"crc": (\d+), "of": (\{.*\})\}\n')

@@ -20,8 +20,7 @@ from typing_extensions import override
 
 from models.basics import StillhookError
 
-POLL = 0.2
-"""Time between two looks at Ctrl-C [s]."""
+POLL = 0.2  #: Time between two looks at Ctrl-C [s].
 
 _RETRIES = 1  # of a task whose worker was killed
 

@@ -16,8 +16,7 @@ from models.run import ExtremeEstimate, Run, attributes
 from ..text import json_data
 from .runs import Runs
 
-FORMAT = 1
-"""Version of the format."""
+FORMAT = 1  #: Version of the format.
 
 
 def runs_data(

@@ -33,8 +33,7 @@ from .time_metrics import STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-JOURNAL, RESULT = "journal.jsonl", "result.nc"
-"""Names of the files in the folder of a sweep."""
+JOURNAL, RESULT = "journal.jsonl", "result.nc"  #: Names of the files in the folder of a sweep.
 
 _WHAT = "sweep"
 

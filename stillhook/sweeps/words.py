@@ -22,8 +22,7 @@ from .time_metrics import STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-QUANTILES = (0.05, 0.5, 0.95)
-"""Shares of the stable cases that are below what is told."""
+QUANTILES = (0.05, 0.5, 0.95)  #: Shares of the stable cases that are below what is told.
 
 _AFTER = {  # what a status says, after "1 case" and after "N cases"
     "diverged": ("diverged", "diverged"),

@@ -25,8 +25,7 @@ from models.sea import Scatter
 
 from .contour import Contour
 
-HIGHEST_TENTH = 1.27
-"""H_1/10 over H_s [-]."""
+HIGHEST_TENTH = 1.27  #: H_1/10 over H_s [-].
 _MOST_CLASSES = 80  # of H_s: more are measured heights
 
 

@@ -21,8 +21,7 @@ from models.basics import check_range
 from models.case import Case
 from models.rig import DCMotor
 
-INERTIA_EXPONENT = 5.0 / 3.0
-"""Of the rotor's inertia over the torque."""
+INERTIA_EXPONENT = 5.0 / 3.0  #: Of the rotor's inertia over the torque.
 
 _DRIVE = ("torque_continuous", "torque_peak", "power", "current_continuous", "current_peak")
 

@@ -25,10 +25,8 @@ from ..search import Progress
 from .follow import Answer, follow, posed
 from .motor import MotorData, with_motor
 
-TARGET = "payload.displacement.rms"
-"""Name of the target among the limits."""
-AT_REST = "the load at rest"
-"""What binds where any motor that holds the load does the rest too."""
+TARGET = "payload.displacement.rms"  #: Name of the target among the limits.
+AT_REST = "the load at rest"  #: What binds where any motor that holds the load does the rest too.
 RATINGS = (
     "motor.torque.peak",
     "motor.torque.continuous",

@@ -128,8 +128,7 @@ class SolvedRows:
             self.products[pair][at] = column
 
 
-SIGNS = [*product((1.0, -1.0), repeat=2)]
-"""Of gain and phase error."""
+SIGNS = [*product((1.0, -1.0), repeat=2)]  #: Of gain and phase error.
 
 
 def of_signs(products: FloatArray, signs: Sequence[float]) -> FloatArray:

@@ -57,8 +57,7 @@ Progress = Callable[[int, int], None]
 
 _NAMES = tuple(mode.capitalize() for mode in MODES)
 
-KEPT = 64
-"""Computations kept; the ones longest unused go first."""
+KEPT = 64  #: Computations kept; the ones longest unused go first.
 
 _ARRAYS = ("omega", "heading", "added_mass", "damping", "excitation")
 _FORMAT = 4  # goes up when what is computed from the same inputs changes

@@ -18,11 +18,9 @@ import numpy as np
 from ...basics import FloatArray, InputError, check_range, read_bytes
 from .hull import Hull, panel_areas
 
-FORMATS = (".stl", ".gdf", ".pnl", ".hst", ".mar")
-"""Endings of the files that are read."""
+FORMATS = (".stl", ".gdf", ".pnl", ".hst", ".mar")  #: Endings of the files that are read.
 
-MOST_PANELS = 6000
-"""Most panels: the matrices of the panel method have as many rows and columns."""
+MOST_PANELS = 6000  #: Most panels: the matrices of the panel method have as many rows and columns.
 
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VERTEX = re.compile(

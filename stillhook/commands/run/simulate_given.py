@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from models.simulation import SimulationOptions
     from synth.design import Design
 
-TIME = quantity("time", 0.0, 1e8, open_low=True)
-"""Reads a time span [s]."""
+TIME = quantity("time", 0.0, 1e8, open_low=True)  #: Reads a time span [s].
 
 
 @dataclass(frozen=True, kw_only=True)
