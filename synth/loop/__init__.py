@@ -39,6 +39,6 @@ if TYPE_CHECKING:
     )
     from .margins import Margins, least_distances, level_ends, loop_margins, refine_minima
     from .pole_region import PoleRegion, counted_poles, with_delay_models
-    from .responses import Closing, LoopBlocks, LoopResponses
+    from .responses import Closing, LoopBlocks, LoopResponses, Shaking
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

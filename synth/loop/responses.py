@@ -82,16 +82,10 @@ class LoopBlocks:
         )
         return cls(s=response.s, zw=zw, zu=zu, yw=yw, yu=yu, outputs=outputs, sources=sources)
 
-    def part(self, which: slice) -> LoopBlocks:
-        """Return some of the points."""
-        return replace(
-            self,
-            s=self.s[which],
-            zw=self.zw[..., which],
-            zu=self.zu[..., which],
-            yw=self.yw[..., which],
-            yu=self.yu[..., which],
-        )
+    def repeated(self, times: int) -> LoopBlocks:
+        """Return the points several times, one after the other."""
+        zw, zu, yw, yu = (np.tile(part, times) for part in (self.zw, self.zu, self.yw, self.yu))
+        return replace(self, s=np.tile(self.s, times), zw=zw, zu=zu, yw=yw, yu=yu)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,6 +132,27 @@ class Closing:
         for (i, j), entry in self.entries.items():
             found[i] += entry * b[j]
         return found
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shaking:
+    """What shakes a loop at k points, times quadrature weights.
+
+    Attributes
+    ----------
+    weights
+        Of the density of each disturbance, (nw, k).
+    source, error, shares
+        Places of two disturbances that go together, and of their cross-densities, (e, k).
+    signs
+        Every combination of signs that these may have, (c, e).
+    """
+
+    weights: FloatArray
+    source: int
+    error: int
+    shares: ComplexArray
+    signs: FloatArray
 
 
 class LoopResponses:
@@ -244,37 +259,60 @@ class LoopResponses:
             found[at] += slope * (left[i] * right[j])
         return found
 
-    def moments(self, outputs: Sequence[str], weights: FloatArray, orders: Sequence[int]) -> Any:
-        """Return integrals of |F|^2 over all disturbances.
+    def integrals(
+        self, pairs: Sequence[tuple[str, str]], shaking: Shaking, orders: Sequence[int]
+    ) -> Any:
+        """Return integrals of Re conj(F_one) S F_other over all disturbances, moments among them.
 
         Parameters
         ----------
-        outputs, orders
-            Output of each integral, and the power of omega in it.
-        weights
-            Quadrature weights times density of each disturbance, (nw, k).
+        pairs, orders
+            The two outputs of each integral, and the powers of omega in it.
+        shaking
+            S, its diagonal first and then what is beside it, one after the other.
 
         Returns
         -------
         ndarray or Dual
-            (z, ..., number of orders).
+            (pairs, orders, ..., 1 + e).
         """
-        rows = [self.outputs.index(name) for name in outputs]
-        found = self._all(rows)
-        spread = weights.reshape(len(weights), *(1,) * (found.ndim - 3), -1)
-        powers = np.array([self._omega**order for order in orders]).T
-        value = np.sum((found.real**2 + found.imag**2) * spread, axis=1) @ powers
+        rows = {name: self.outputs.index(name) for pair in pairs for name in pair}
+        names = [*rows]
+        ones, others = np.array([[names.index(name) for name in pair] for pair in pairs]).T
+        found = self._all([*rows.values()])  # (z, nw, ..., k)
+        powers = np.array([self._omega**order for order in orders])
+        weights = shaking.weights.reshape(shaking.weights.shape[0], *(1,) * (found.ndim - 3), -1)
+        own = found.view(np.float64)
+        products = (own[ones] * own[others] * np.repeat(weights, 2, axis=-1)).sum(axis=1)
+        value = [products @ np.repeat(powers, 2, axis=-1).T]
+        source, error = shaking.source, shaking.error
+        # Re share conj(a) b, and over all orders and shares at once.
+        shares = (powers[:, None] * shaking.shares).reshape(-1, powers.shape[1])
+        if len(shaking.shares):
+            crossed = found[ones, source].conj() * found[others, error]
+            crossed += found[ones, error] * found[others, source].conj()
+            value.append((crossed @ shares.T).real)
+        parts = [each.reshape(*each.shape[:-1], len(orders), -1) for each in value]
+        values = np.moveaxis(np.concatenate(parts, axis=-1), -2, 1)
         if self._closing.slopes is None:
-            return value
-        slope = np.zeros((self.count, len(rows) * len(orders)))
-        adjoint = 2.0 * np.conj(found) * weights
-        through = self._through(rows)
-        for i, at, change in self._changes:
-            back = adjoint * through[:, i, None]
-            each = np.conj([back * power for power in powers.T])  # (orders, z, nw, k)
-            flat = np.swapaxes(each, 0, 1).reshape(slope.shape[1], -1)
-            slope[at] += _real_product(change.reshape(len(at), -1), flat)
-        return Dual(value, slope.reshape(-1, *value.shape))
+            return values
+        heard = [*dict.fromkeys(j for _, j in self._closing.slopes)]
+        turned = self._heard[heard].conj()
+        seen = [np.einsum("zwk,jwk->jzk", found * weights, turned)]
+        for share in shaking.shares:
+            part = turned[:, None, error] * (found[None, :, source] * share.conj())
+            seen.append(part + turned[:, None, source] * (found[None, :, error] * share))
+        back = np.array(seen)  # (1 + e, j, z, k)
+        through = self._through([*rows.values()]).conj()
+        slope = np.zeros((self.count, len(orders), len(seen) * len(pairs)))
+        for (i, j), (at, change) in self._closing.slopes.items():
+            own, way = back[:, heard.index(j)], through[:, i]
+            both = own[:, ones] * way[others] + own[:, others] * way[ones]
+            turns = (change[:, None] * powers).reshape(-1, change.shape[1])
+            added = _real_product(turns, both.reshape(slope.shape[2], -1))
+            slope[at] += added.reshape(len(at), len(orders), -1)
+        every = slope.reshape(self.count, len(orders), len(seen), len(pairs))
+        return Dual(values, every.transpose(0, 3, 1, 2))
 
     @cached_property
     def _changes(self) -> list[tuple[int, list[int], ComplexArray]]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
         least_damping_text,
         pose_family,
     )
-    from .loop_numbers import LoopNumbers, Point, moment_weights
+    from .loop_numbers import LoopNumbers, Point, moment_weights, on_sides
     from .problem import Goal, Problem, Values
     from .question import (
         GAINS,

@@ -9,24 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import eig
 
 from models.basics import BoolArray, ComplexArray, FloatArray, Quadrature
 
-from ..limits import DelayMargin, GainMargin, GainMarginDown, Limit, Size
+from ..limits import DelayMargin, GainMargin, GainMarginDown, Limit
 from ..loop import (
     Closing,
     CoherentError,
     Dual,
     LoopResponses,
+    Shaking,
     at_least,
-    conj,
     counted_poles,
     exp,
     imag,
@@ -38,12 +38,13 @@ from ..loop import (
     value_of,
 )
 from ..structures import ParametrisedController
-from .places import SHIFT, Search, beside, crossings, peaks, together
+from .places import IntArray, Search, crossings, peaks, together
 from .problem import Goal, Problem
 
 _FAINT = 1e-3  # loop gains whose crossings of the axis no gain margin is about
 _SMALL = 1e-3  # of its typical size: a parameter below it is shifted as if it were that
 _SINGLE, _NUDGE = 1e-9, 1e-15  # product of unit eigenvectors below which poles are pulled apart
+_SHIFT = 1e-6  # relative, of a parameter, of differences
 _AXIS, _CIRCLE = "real axis", "unit circle"
 _ORDERS = (0, 2)  # of the spectral moments
 _STILL = 1e-100  # a variance that is none
@@ -68,15 +69,11 @@ class Point:
     coefficients: Sequence[Any] = ()
     slopes: bool = False
 
-    def sides(self, problem: Problem) -> list[Point]:
-        """Return the point, and that without losses where it has some: margins hold at both."""
-        still = problem.still(self.coefficients)
-        if all(a is b for a, b in zip(still, self.coefficients, strict=True)):
-            return [self]
-        return [self, replace(self, coefficients=still)]
+    def closing(self, problem: Problem, s: ComplexArray, still: BoolArray | None = None) -> Closing:
+        """Return what closes the loop of a problem at points `s`, (k,) [1/s].
 
-    def closing(self, problem: Problem, s: ComplexArray) -> Closing:
-        """Return what closes the loop of a problem at points `s`, (k,) [1/s]."""
+        Where `still` is true, (k,), it is closed without losses.
+        """
         law: ParametrisedController = problem.law
         count = len(self.values)
         values: list[Any] = list(self.values)
@@ -98,11 +95,14 @@ class Point:
                     slope = np.broadcast_to(entry.slope, (len(entry.at), s.size))
                     slopes[i, j] = list(entry.at), np.asarray(slope, dtype=np.complex128)
         m, length = len(law_entries), len(law_entries[0])
-        for element, coefficient in zip(problem.elements, self.coefficients, strict=True):
+        calm = problem.still(self.coefficients)
+        for element, known, rest in zip(problem.elements, self.coefficients, calm, strict=True):
+            coefficient = known if still is None else np.where(still, rest, known)
             added = np.asarray(coefficient - element.reference, dtype=np.complex128)
             entries[m, length] = np.broadcast_to(-added, (*added.shape[:-1], s.size))
             if self.slopes:
-                slopes[m, length] = [count], np.full((1, s.size), -coefficient, np.complex128)
+                slope = np.full((1, s.size), -coefficient, np.complex128)
+                slopes[m, length] = [count], slope
             m, length, count = m + 1, length + 1, count + 1
         return Closing(
             entries=entries,
@@ -112,25 +112,37 @@ class Point:
         )
 
 
-def moment_weights(problem: Problem, nodes: Quadrature) -> FloatArray:
-    """Return quadrature weights times densities, (nw, k)."""
+def moment_weights(problem: Problem, nodes: Quadrature) -> Shaking:
+    """Return what shakes the loop of a problem on quadrature nodes."""
     densities = [d.density(nodes.omega) * nodes.weights for d in problem.disturbances]
     # What only limits speak of shakes nothing.
-    still = np.zeros((len(problem.sources) - len(densities), nodes.omega.size))
-    return np.vstack([*densities, still])
+    silent = np.zeros((len(problem.sources) - len(densities), nodes.omega.size))
+    pair = CoherentError.among(problem.disturbances)
+    source, error = (0, 0) if pair is None else (pair.source, pair.error)
+    shares = np.zeros((0, nodes.omega.size), np.complex128)
+    if pair is not None:
+        shares = pair.shares(nodes.omega) * densities[source]
+    return Shaking(
+        weights=np.vstack([*densities, silent]),
+        source=source,
+        error=error,
+        shares=shares,
+        signs=np.array([()] if pair is None else pair.signs),
+    )
 
 
-Fresh = Callable[[FloatArray, bool], Sequence[LoopResponses]]
-Take = Callable[[Sequence[LoopResponses]], Any]
+def on_sides(problem: Problem, points: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], BoolArray]:
+    """Return points, (k,), once more where there are losses, and which are those without them.
+
+    Margins hold at both.
+    """
+    sides = 2 if any(not element.lasting for element in problem.elements) else 1
+    return np.tile(points, sides), np.repeat(np.arange(sides) > 0, points.size)
 
 
-class _Sought(NamedTuple):
-    """Places on a curve: whose they are, the curve in a closed loop, its height, and the search."""
-
-    key: tuple[str, int]
-    take: Take
-    height: Size
-    search: Search
+#: From frequencies [rad/s], (k,), and where losses are none to the closed loop there.
+Fresh = Callable[[FloatArray, BoolArray], LoopResponses]
+Take = Callable[[LoopResponses], Any]
 
 
 class LoopNumbers:
@@ -141,10 +153,9 @@ class LoopNumbers:
     problem
         The problem.
     cost, margins
-        The closed loop on the quadrature nodes, and on the margin frequencies at each side of the
-        point (`Point.sides`).
-    weights, omega
-        The weights of the moments on those nodes, and those frequencies [rad/s].
+        The closed loop on the quadrature nodes, and at the margin frequencies.
+    shaking, omega
+        What shakes it on those nodes, and those frequencies [rad/s]: see `on_sides`.
     point
         What the loop is closed with.
     logs
@@ -153,52 +164,48 @@ class LoopNumbers:
         The variable of a goal other than the cost, or None.
     goal
         What is looked for.
+    fresh
+        If margins are held where they are measured, between the margin frequencies too: the closed
+        loop at other ones.
     """
 
     def __init__(
         self,
         problem: Problem,
         cost: LoopResponses,
-        margins: Sequence[LoopResponses],
-        weights: FloatArray,
+        margins: LoopResponses,
+        shaking: Shaking,
         omega: FloatArray,
         point: Point,
         *,
         logs: Sequence[Any] = (),
         extra: Any = None,
         goal: Goal = Goal.COST,
+        fresh: Fresh | None = None,
     ) -> None:
-        self._problem, self._weights = problem, weights
+        self._problem, self._shaking = problem, shaking
         self._cost, self._margins = cost, margins
         self.omega, self._point = omega, point
         self._logs, self.extra = logs, extra
-        self._goal = goal
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
-        self._fresh: Fresh | None = None
-        self._responses: dict[tuple[str, str], list[Any]] = {}
-        self._shaken: dict[tuple[str, str], Any] = {}
-        self._crosses: dict[tuple[str, str], Any] = {}
+        self._fresh = fresh
+        self._signs = np.zeros((1, len(shaking.shares)))
+        self._curves: dict[tuple[str, str] | None, list[Any]] = {}
         self._peaks: dict[tuple[str, float], Any] = {}
-        self._signs: FloatArray | None = None
 
-    def under(self, problem: Problem, weights: FloatArray) -> LoopNumbers:
+    def under(self, problem: Problem, shaking: Shaking) -> LoopNumbers:
         """Return the same loop shaken by the disturbances of another problem."""
-        return LoopNumbers(
-            problem,
-            self._cost,
-            self._margins,
-            weights,
-            self.omega,
-            self._point,
-            logs=self._logs,
-            extra=self.extra,
-            goal=self._goal,
-        )
+        own = copy(self)
+        for name in ("_every", "_moments", "signed"):
+            own.__dict__.pop(name, None)
+        own._problem, own._shaking, own._peaks = problem, shaking, {}
+        own._signs = np.zeros((1, len(shaking.shares)))
+        return own
 
     @cached_property
     def differences(self) -> list[Any]:
-        """1 + L of every loop at the margin frequencies, (k,) each; at each side of the point."""
-        return [self._padded(take(self._margins)) for take in self._takes(None)]
+        """1 + L of every loop at the margin frequencies, (k,) each."""
+        return self._on_grid(None)
 
     @property
     def module_margin(self) -> float:
@@ -206,88 +213,68 @@ class LoopNumbers:
         bounds = [lim.bound for lim in self._problem.limits if lim.name == "max_sensitivity"]
         return 1.0 / bounds[0] if bounds else 0.0
 
-    def measure(self, fresh: Fresh) -> None:
-        """Let margins be held where they are measured, between the margin frequencies too.
-
-        Parameters
-        ----------
-        fresh
-            From frequencies [rad/s] and whether slopes are wanted to the closed loop there.
-        """
-        self._fresh = fresh
-
     @cached_property
-    def _followed(self) -> Mapping[tuple[str, int], tuple[FloatArray, Any]]:
+    def _followed(self) -> Mapping[str, list[tuple[FloatArray, Any]]]:
         """Where margins are measured between the margin frequencies, and what curves are there.
 
-        By limit, or kind of crossing, and loop.  The places move with the parameters: at a peak
-        that changes a size in second order only, and crossings are known a hair to both sides.
+        By limit, or kind of crossing.  The places move with the parameters: at a peak that changes
+        a size in second order only, and crossings are known a hair to both sides.
         """
-        assert self._fresh is not None
         fresh, sought = self._fresh, self._sought()
+        assert fresh is not None
 
-        def curves(at: FloatArray, sizes: Sequence[int], slopes: bool) -> list[Any]:
-            loop, ends = fresh(at, slopes), np.cumsum([0, *sizes])
+        def curves(at: FloatArray, side: IntArray, cuts: Sequence[slice]) -> list[Any]:
+            loop = fresh(at, side > 0)
             return [
-                self._padded(one.take(loop))[..., begin:end] if begin < end else None
-                for one, (begin, end) in zip(sought, pairwise(ends), strict=True)
+                self._padded(take(loop))[..., cut] if cut.start < cut.stop else None
+                for (_, take, _), cut in zip(sought, cuts, strict=True)
             ]
 
-        def heights(at: FloatArray, sizes: Sequence[int]) -> list[FloatArray]:
-            pieces = np.split(at, np.cumsum(sizes)[:-1])
-            every = zip(sought, pieces, curves(at, sizes, False), strict=True)
-            return [one.height(w, curve) if w.size else w for one, w, curve in every]
+        found: dict[str, list[tuple[FloatArray, Any]]] = {key: [] for key, _, _ in sought}
+        searches = [search for _, _, search in sought]
+        for (key, _, _), place in zip(sought, together(searches, curves), strict=True):
+            found[key] += [] if place is None else [place]
+        return found
 
-        found = together([one.search for one in sought], heights)
-        places = [
-            beside(at) if one.key[0] in (_AXIS, _CIRCLE) else at
-            for one, at in zip(sought, found, strict=True)
-        ]
-        sizes = [at.size for at in places]
-        if not sum(sizes):
-            return {}
-        there = curves(np.concatenate(places), sizes, self._point.slopes)
-        every = zip(sought, found, there, strict=True)
-        return {one.key: (at, curve) for one, at, curve in every if at.size}
-
-    def _sought(self) -> list[_Sought]:
-        """Return the places that limits ask for, of each curve."""
-        omega, limits = self.omega, self._problem.limits
-        found = []
-        for i, (take, d) in enumerate(zip(self._takes(None), self.differences, strict=True)):
-            gain = value_of(d) - 1.0
+    def _sought(self) -> list[tuple[str, Take, Search]]:
+        """Return the places that limits ask for, of each curve: whose, how to take it, search."""
+        limits, sides = self._problem.limits, self._sides
+        omega = self.omega[: self.omega.size // sides]
+        found: list[tuple[str, Take, Search]] = []
+        for take, d in zip(self._takes(None), self.differences, strict=True):
+            gain = value_of(d).reshape(sides, -1) - 1.0
             if any(isinstance(limit, GainMargin | GainMarginDown) for limit in limits):
-                search = crossings(omega, gain.imag, np.abs(gain) > _FAINT)
-                found.append(_Sought((_AXIS, i), take, _height, search))
+                behind = (np.abs(gain) > _FAINT) & (gain.real < 0.0)
+                search = crossings(omega, gain, _height, behind)
+                found.append((_AXIS, take, search))
             if any(isinstance(limit, DelayMargin) for limit in limits):
-                search = crossings(omega, np.abs(gain) - 1.0)
-                found.append(_Sought((_CIRCLE, i), take, _excess, search))
+                found.append((_CIRCLE, take, crossings(omega, gain, _excess)))
         for limit in limits:
             if limit.followed is None:
                 continue
-            size, above = limit.followed
             curves = zip(self._takes(limit.channel), self._on_grid(limit.channel), strict=True)
-            for i, (take, curve) in enumerate(curves):
-                search = peaks(omega, size(omega, value_of(curve)), above)
-                found.append(_Sought((limit.name, i), take, size, search))
+            for take, curve in curves:
+                values = value_of(curve).reshape(sides, -1)
+                found.append((limit.name, take, peaks(omega, values, *limit.followed)))
         return found
+
+    @property
+    def _sides(self) -> int:
+        return on_sides(self._problem, np.zeros(1))[0].size
 
     def _takes(self, channel: tuple[str, str] | None) -> list[Take]:
         """Return how to take the curves that a limit is on from a closed loop."""
-        sides = range(len(self._margins))
         if channel is not None:
-            return [partial(_response, k, channel) for k in sides]
+            return [lambda loop: loop.response(*channel)]
         inputs = range(len(self._problem.plant.inputs))
-        return [partial(_difference, k, i) for k in sides for i in inputs]
+        return [partial(_difference, index=i) for i in inputs]
 
     def _on_grid(self, channel: tuple[str, str] | None) -> list[Any]:
         """Return the curves that a limit is on at the margin frequencies."""
-        if channel is None:
-            return self.differences
-        if channel not in self._responses:
+        if channel not in self._curves:
             takes = self._takes(channel)
-            self._responses[channel] = [self._padded(take(self._margins)) for take in takes]
-        return self._responses[channel]
+            self._curves[channel] = [self._padded(take(self._margins)) for take in takes]
+        return self._curves[channel]
 
     def curves(self, limit: Limit) -> list[tuple[FloatArray, Any]]:
         """Return the curves that a limit is on, at the margin frequencies and at peaks between.
@@ -296,8 +283,7 @@ class LoopNumbers:
         """
         found = [(self.omega, curve) for curve in self._on_grid(limit.channel)]
         if self._fresh is not None:
-            keys = [(limit.name, i) for i in range(len(found))]
-            found += [self._followed[key] for key in keys if key in self._followed]
+            found += self._followed.get(limit.name, [])
         return found
 
     @cached_property
@@ -332,14 +318,14 @@ class LoopNumbers:
                 break
         product = np.where(product == 0.0, 1.0, product)
         scales = [_SMALL * p.scale for p in problem.law.parameters]
-        steps = np.diag(SHIFT * np.maximum(np.abs(values), scales))
+        steps = np.diag(_SHIFT * np.maximum(np.abs(values), scales))
         slopes = []
         ends = [[(values + sign * step, known) for sign in (1.0, -1.0)] for step in steps]
         widths = [2.0 * step.sum() for step in steps]
         for unit in np.eye(len(known)):
-            shifts = [1.0 + sign * SHIFT * unit for sign in (1.0, -1.0)]
+            shifts = [1.0 + sign * _SHIFT * unit for sign in (1.0, -1.0)]
             ends.append([(values, (np.array(known) * shift).tolist()) for shift in shifts])
-            widths.append(2.0 * SHIFT)  # of its logarithm
+            widths.append(2.0 * _SHIFT)  # of its logarithm
         for (more, less), width in zip(ends, widths, strict=True):
             change = problem.loop_matrix(plant, *more) - problem.loop_matrix(plant, *less)
             slopes.append(np.einsum("ik,ij,jk->k", left.conj(), change / width, right) / product)
@@ -353,15 +339,16 @@ class LoopNumbers:
         """
         if self._fresh is None:
             return None
+        ends = np.arange(self.omega.size).reshape(self._sides, -1)[:, [0, -1]]
         found = []
-        for i, d in enumerate(self.differences):
-            ends = (d - 1.0)[..., [0, -1]]
-            own = [real(ends)[..., level_ends(value_of(d) - 1.0)]]
-            if (_AXIS, i) in self._followed:
-                loop, rate = _moving(*self._followed[_AXIS, i])
-                own.insert(0, real(loop) - imag(loop) * (rate.real / rate.imag))
-            found += [on[..., value_of(on) < 0.0] for on in own]
-        return joined(found)
+        for d in self.differences:
+            gain = value_of(d) - 1.0
+            level = np.concatenate([pair[level_ends(gain[pair])] for pair in ends])
+            found.append(real(d[..., level]) - 1.0)
+        for place in self._followed.get(_AXIS, []):
+            loop, rate = _moving(*place)
+            found.append(real(loop) - imag(loop) * (rate.real / rate.imag))
+        return joined([on[..., value_of(on) < 0.0] for on in found])
 
     @cached_property
     def turning_delays(self) -> Any | None:
@@ -369,11 +356,9 @@ class LoopNumbers:
         if self._fresh is None:
             return None
         found: list[Any] = [self.differences[0][..., :0]]
-        for i in range(len(self.differences)):
-            if (_CIRCLE, i) not in self._followed:
-                continue
-            at = self._followed[_CIRCLE, i][0]
-            loop, rate = _moving(*self._followed[_CIRCLE, i])
+        for beside_it in self._followed.get(_CIRCLE, []):
+            at = beside_it[0].reshape(2, -1).mean(axis=0)
+            loop, rate = _moving(*beside_it)
             gain = value_of(loop)
             turn = np.mod(np.angle(-gain), 2.0 * np.pi)
             if not isinstance(loop, Dual):
@@ -386,33 +371,38 @@ class LoopNumbers:
         return real(joined(found))
 
     @cached_property
+    def _pairs(self) -> list[tuple[str, str]]:
+        """Every output with itself, and the two that a limit speaks of."""
+        both = {lim.outputs: None for lim in self._problem.limits if len(lim.outputs) == 2}
+        return [*((name, name) for name in self._cost.outputs), *both]
+
+    @cached_property
+    def _every(self) -> Any:
+        """Integrals of all pairs, (pairs, orders, ..., 1 + e): the mean, and what signs turn."""
+        return self._padded(self._cost.integrals(self._pairs, self._shaking, _ORDERS))
+
+    @cached_property
     def _moments(self) -> Any:
-        """Spectral moments m_0 and m_2 of every output, (z, ..., 2)."""
-        return self._padded(self._cost.moments(self._cost.outputs, self._weights, _ORDERS))
+        """Moments and covariances by combination of signs, (pairs, orders, ..., c)."""
+        return self._every @ np.vstack([np.ones(len(self._signs)), self._signs.T])
 
     def moment(self, output: str, order: int) -> Any:
         """Return the spectral moment m_order of `output`, (1,), or by combination of signs."""
-        row, at = self._cost.outputs.index(output), _ORDERS.index(order)
-        found, every = slice(at, at + 1), self._moments
-        if isinstance(every, Dual):
-            moment: Any = Dual(every.value[row, found], every.slope[:, row, found])
-        else:
-            moment = every[row, ..., found]
-        if self._signs is not None:
-            # A programme's logarithms want it above zero, where error and motion cancel.
-            moment = at_least(moment + self._crossed(output, output, order), _STILL)
-        return moment if self._amplitude is None else moment * self._amplitude
+        # A programme's logarithms want it above zero, where error and motion cancel.
+        found = self._one((output, output), order)
+        return at_least(found, _STILL) if self._signs.any() else found
 
     def covariance(self, one: str, other: str) -> Any:
         """Return the covariance of two outputs, (1,), or by combination of signs."""
-        parts = [
-            real(conj(self._shown(one, d.name)) * self._shown(other, d.name)) @ weights[:, None]
-            for d, weights in zip(self._problem.disturbances, self._weights, strict=False)
-        ]
-        total = sum(parts[1:], parts[0])
-        if self._signs is not None:
-            total = total + self._crossed(one, other, 0)
-        return total if self._amplitude is None else total * self._amplitude
+        return self._one((one, other), 0)
+
+    def _one(self, pair: tuple[str, str], order: int) -> Any:
+        row, at, every = self._pairs.index(pair), _ORDERS.index(order), self._moments
+        if isinstance(every, Dual):
+            found: Any = Dual(every.value[row, at], every.slope[:, row, at])
+        else:
+            found = every[row, at]
+        return found if self._amplitude is None else found * self._amplitude
 
     @cached_property
     def signed(self) -> LoopNumbers:
@@ -420,46 +410,13 @@ class LoopNumbers:
 
         Its moments are those of each combination, (c,), where its own are the mean over all.
         """
-        if self._coherent is None:
+        if not self._shaking.signs.any():
             return self
-        _ = self._moments, self._shares  # once for both
+        _ = self._every  # once for both
         own = copy(self)
-        own._signs, own._peaks = np.array(self._coherent.signs), {}
+        own.__dict__.pop("_moments", None)
+        own._signs, own._peaks = self._shaking.signs, {}
         return own
-
-    @cached_property
-    def _coherent(self) -> CoherentError | None:
-        return CoherentError.among(self._problem.disturbances)
-
-    @cached_property
-    def _shares(self) -> ComplexArray:
-        """Weights of the products of source and error, (k, orders times errors)."""
-        assert self._coherent is not None
-        omega = self._cost.omega
-        shares = self._coherent.shares(omega) * self._weights[self._coherent.source]
-        return np.concatenate([shares * omega**order for order in _ORDERS]).T
-
-    def _crossed(self, one: str, other: str, order: int) -> Any:
-        """Return what the error's signs add to an integral of conj(F) F of two outputs, (c,)."""
-        pair, signs = self._coherent, self._signs
-        assert pair is not None
-        assert signs is not None
-        if (one, other) not in self._crosses:
-            source, error = (self._problem.disturbances[i].name for i in (pair.source, pair.error))
-            product = conj(self._shown(one, source)) * self._shown(other, error)
-            if one == other:
-                product = product * 2.0
-            else:
-                product = product + conj(self._shown(other, source)) * self._shown(one, error)
-            self._crosses[one, other] = real(product @ self._shares)
-        errors, at = signs.shape[1], _ORDERS.index(order)
-        return self._crosses[one, other][..., at * errors : (at + 1) * errors] @ signs.T
-
-    def _shown(self, output: str, source: str) -> Any:
-        """Return a response on the quadrature nodes, (k,)."""
-        if (output, source) not in self._shaken:
-            self._shaken[output, source] = self._padded(self._cost.response(output, source))
-        return self._shaken[output, source]
 
     def peak(self, output: str, duration: float) -> Any:
         """Return the most probable maximum of `output` in `duration` [s], as its moments are."""
@@ -484,9 +441,8 @@ class LoopNumbers:
         size = self._cost.count
         total, variance = np.zeros((size, size)), 0.0
         for name, weight in self._problem.minimise.items():
-            total += weight * self._cost.curvature(name, self._weights)
-            row = self._cost.outputs.index(name)
-            variance += weight * float(value_of(self._moments)[row, 0])
+            total += weight * self._cost.curvature(name, self._shaking.weights)
+            variance += weight * float(value_of(self._every)[self._pairs.index((name, name)), 0, 0])
         found = total / variance
         if isinstance(self.extra, Dual):
             found = np.pad(found, (0, 1))
@@ -504,12 +460,8 @@ class LoopNumbers:
         return Dual(found.value, np.concatenate([found.slope, np.zeros_like(found.slope[:1])]))
 
 
-def _response(side: int, channel: tuple[str, str], loops: Sequence[LoopResponses]) -> Any:
-    return loops[side].response(*channel)
-
-
-def _difference(side: int, index: int, loops: Sequence[LoopResponses]) -> Any:
-    return loops[side].difference(index)
+def _difference(loop: LoopResponses, index: int) -> Any:
+    return loop.difference(index)
 
 
 def _counted(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, BoolArray]:
@@ -523,21 +475,22 @@ def _counted(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, Bool
     return swinging, own
 
 
-def _moving(omega: FloatArray, beside_it: Any) -> tuple[Any, ComplexArray]:
-    """Return L at frequencies [rad/s], and dL/d omega by central differences, (k,) each.
+def _moving(beside_it: FloatArray, curve: Any) -> tuple[Any, ComplexArray]:
+    """Return L at places, and dL/d omega by central differences, (k,) each.
 
-    From 1 + L a hair above and a hair below, (2 k,); see `places.beside`.
+    From 1 + L at frequencies [rad/s] a hair above and a hair below, (2 k,); see `places.beside`.
     """
-    above, below = beside_it[..., : omega.size], beside_it[..., omega.size :]
-    rate = (value_of(above) - value_of(below)) / (2.0 * SHIFT * omega)
+    size = beside_it.size // 2
+    above, below = curve[..., :size], curve[..., size:]
+    rate = (value_of(above) - value_of(below)) / (beside_it[:size] - beside_it[size:])
     return (above + below) * 0.5 - 1.0, np.asarray(rate)
 
 
-def _height(_: FloatArray, difference: Any) -> FloatArray:
+def _height(gain: ComplexArray) -> FloatArray:
     """Return Im L, (k,)."""
-    return np.asarray(difference.imag)
+    return np.asarray(gain.imag)
 
 
-def _excess(_: FloatArray, difference: Any) -> FloatArray:
+def _excess(gain: ComplexArray) -> FloatArray:
     """Return |L| - 1, (k,)."""
-    return np.asarray(np.abs(difference - 1.0) - 1.0)
+    return np.asarray(np.abs(gain) - 1.0)

@@ -1,4 +1,4 @@
-"""Places on a curve that moves with its parameters: peaks and crossings between known points.
+"""Places on curves that move with their parameters: peaks and crossings between known points.
 
 A descent needs them at every step, and needs each only so well that what is read there is right:
 at a peak to second order of the place, at a crossing after one more step of Newton's.  So they are
@@ -9,93 +9,154 @@ looked for where interpolation says, a few calls with all places of all curves a
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from models.basics import BoolArray, FloatArray
+from models.basics import BoolArray, ComplexArray, FloatArray
 
-#: Asks for a curve at frequencies [rad/s], (k,), and is told it there; returns places on it, (c,).
-Search = Generator[FloatArray, FloatArray, FloatArray]
+from ..limits import Size
+from ..loop import value_of
 
-SHIFT = 1e-6  # relative, of a frequency, of differences
-_CLOSER = (0.3, 0.05, 0.01)  # width of parabolas about a peak, over its neighbours' distance
-_FORETOLD = 1e-6  # relative error of a parabola at its vertex that the next makes as good as none
-_STEPS = 2  # Newton's, towards a crossing
+IntArray = npt.NDArray[np.intp]
+
+#: Asks for curves at frequencies [rad/s], (c,), each on one of several, and is told it there; the
+#: last asked for are the places.
+Search = Generator[tuple[FloatArray, IntArray], ComplexArray, None]
+
+_SHIFT = 1e-6  # relative, of a frequency, of differences
+_NODES, _FINE = 5, 33  # known points that interpolation takes, and how finely it is looked at
+_ROUNDS = 4
+_FORETOLD = 1e-8  # relative error of interpolation at a peak that counts as none
+_HAIR = 1e-6  # of the distance of known points: a last step of Newton's towards a crossing
 
 
 def together(
-    searches: Sequence[Search], curves: Callable[[FloatArray, Sequence[int]], list[FloatArray]]
-) -> list[FloatArray]:
-    """Return what searches find, from frequencies of all and how many are whose to their curves."""
-    found = [np.zeros(0)] * len(searches)
-    asked: dict[int, FloatArray] = {}
+    searches: Sequence[Search],
+    curves: Callable[[FloatArray, IntArray, Sequence[slice]], Sequence[Any]],
+) -> list[tuple[FloatArray, Any] | None]:
+    """Return the places that searches find, and what their curves are there, with slopes.
 
-    def go_on(k: int, told: FloatArray | None) -> None:
-        try:
-            asked[k] = next(searches[k]) if told is None else searches[k].send(told)
-        except StopIteration as done:
-            found[k] = done.value
-            asked.pop(k, None)
-
-    for k in range(len(searches)):
-        go_on(k, None)
+    From frequencies of all, on which curve they are, and which of them are whose, to the curves.
+    """
+    found: list[tuple[FloatArray, Any] | None] = [None] * len(searches)
+    with np.errstate(all="ignore"):  # interpolation may break down
+        asked = {k: wish for k, search in enumerate(searches) if (wish := next(search, None))}
     while asked:
-        sizes = [asked[k].size if k in asked else 0 for k in range(len(searches))]
-        told = curves(np.concatenate([*asked.values()]), sizes)
-        for k in list(asked):
-            go_on(k, told[k])
+        sizes = [asked[k][0].size if k in asked else 0 for k in range(len(searches))]
+        cuts = [slice(*pair) for pair in pairwise(np.cumsum([0, *sizes]).tolist())]
+        at, on = (np.concatenate(parts) for parts in zip(*asked.values(), strict=True))
+        told = curves(at, on, cuts)
+        for k, (places, _) in [*asked.items()]:
+            found[k] = places, told[k]
+            try:
+                with np.errstate(all="ignore"):
+                    asked[k] = searches[k].send(value_of(told[k]))
+            except StopIteration:
+                del asked[k]
     return found
 
 
-def peaks(omega: FloatArray, values: FloatArray, above: float) -> Search:
-    """Look for the peaks of a curve above a value, from its values at `omega`."""
-    inner = values[1:-1]
-    top = (inner >= values[:-2]) & (inner >= values[2:]) & (inner > above)
-    at = np.flatnonzero(top) + 1
+def peaks(omega: FloatArray, values: ComplexArray, size: Size, above: float) -> Search:
+    """Look for the peaks of sizes above a value, from curves, (curves, k), at `omega`."""
+    sizes = np.array([size(omega, each) for each in values])
+    inner = sizes[:, 1:-1]
+    top = (inner >= sizes[:, :-2]) & (inner >= sizes[:, 2:]) & (inner > above)
+    on, at = np.nonzero(top)
     if not at.size:
-        return np.zeros(0)
-    low, high = omega[at - 1], omega[at + 1]
-    nodes, found = omega[at + _BESIDE], values[at + _BESIDE]
-    for share in _CLOSER:
-        vertex, foretold = _vertex(nodes, found)
-        middle = np.clip(vertex, low, high)
-        nodes = middle + 0.5 * share * (high - low) * _BESIDE
-        found = (yield nodes.ravel()).reshape(nodes.shape)
-        if np.all(np.abs(found[1] - foretold) <= _FORETOLD * found[1]):
+        return
+    nodes, known = _about(omega, values, on, at + 1)
+    each, place, right = np.arange(at.size), omega[at + 1], np.zeros(at.size, np.bool_)
+    for _ in range(_ROUNDS):
+        ends = omega[at], omega[at + 2]
+        for _ in range(2):
+            fine = np.linspace(*ends, _FINE)
+            guess = _interpolated(nodes, known, fine)
+            depth = 1.0 / size(fine.ravel(), guess.ravel()).reshape(fine.shape) ** 2
+            least = np.nanargmin(np.where(np.isfinite(depth), depth, np.inf), axis=0)
+            near = np.clip(least, 1, _FINE - 2) + np.array([[-1], [0], [1]])
+            ends = fine[near[0], each], fine[near[2], each]
+        vertex = _vertex(fine[near, each], depth[near, each])
+        vertex = np.where(np.isfinite(vertex), vertex, fine[least, each])
+        place = np.where(right, place, vertex)
+        foretold = size(place, _interpolated(nodes, known, place))
+        told = yield place, on
+        right |= np.abs(size(place, told) - foretold) <= _FORETOLD * foretold
+        if right.all():
             break
-    return np.clip(_vertex(nodes, found)[0], low, high)
+        nodes, known = np.vstack([nodes, place]), np.vstack([known, told])
 
 
-def crossings(omega: FloatArray, values: FloatArray, among: BoolArray | None = None) -> Search:
-    """Look for where a curve changes its sign, from its values at `omega`.
+def crossings(
+    omega: FloatArray,
+    gains: ComplexArray,
+    height: Callable[[ComplexArray], FloatArray],
+    among: BoolArray | None = None,
+) -> Search:
+    """Look for where a height of curves changes its sign, from gains, (curves, k), at `omega`.
 
-    Of the changes only those count that have an end among the places where `among` is true.
+    Of the changes only those count that have an end among the places where `among` is true.  Each
+    place is asked for as two, the frequencies above, then those below some by a hair, of 1 + gain.
     """
+    values = height(gains)
     # Zero counts as positive, so that a crossing that falls on a known point is seen once.
-    changed = (values[:-1] >= 0.0) != (values[1:] >= 0.0)
-    at = np.flatnonzero(changed if among is None else changed & (among[:-1] | among[1:]))
-    low, high = omega[at], omega[at + 1]
-    place = low + (high - low) * values[at] / (values[at] - values[at + 1])
-    for _ in range(_STEPS if at.size else 0):
-        ends = (yield beside(place)).reshape(2, -1)
-        rate = (ends[0] - ends[1]) / (2.0 * SHIFT * place)
-        step = -0.5 * (ends[0] + ends[1]) / np.where(rate == 0.0, np.inf, rate)
-        place = np.clip(place + step, low, high)
-    return place
+    changed = (values[:, :-1] >= 0.0) != (values[:, 1:] >= 0.0)
+    on, at = np.nonzero(changed if among is None else changed & (among[:, :-1] | among[:, 1:]))
+    if not at.size:
+        return
+    low, high, rising = omega[at], omega[at + 1], values[on, at] < 0.0
+    nodes, known = _about(omega, gains, on, at)
+    ends, each = (low, high), np.arange(at.size)
+    for _ in range(2):
+        fine = np.linspace(*ends, _FINE)
+        heights = height(_interpolated(nodes, known, fine))
+        beyond = (heights[1:] >= 0.0) == rising
+        beyond[-1] = True
+        last = beyond.argmax(axis=0)
+        ends = fine[last, each], fine[last + 1, each]
+    first, then = heights[last, each], heights[last + 1, each]
+    place = ends[0] + (ends[1] - ends[0]) * first / (first - then)
+    for _ in range(_ROUNDS):
+        place = np.where((place >= low) & (place <= high), place, 0.5 * (low + high))
+        pair = np.concatenate([place * (1.0 + _SHIFT), place * (1.0 - _SHIFT)])
+        above, below = height((yield pair, np.tile(on, 2)) - 1.0).reshape(2, -1)
+        there, rate = 0.5 * (above + below), (above - below) / (2.0 * _SHIFT * place)
+        if np.all(np.abs(there) <= _HAIR * np.abs(rate) * (omega[at + 1] - omega[at])):
+            break
+        passed = (there >= 0.0) == rising
+        low, high = np.where(passed, low, place), np.where(passed, place, high)
+        place = place - there / rate
 
 
-def beside(omega: FloatArray) -> FloatArray:
-    """Return the frequencies above, then those below some by a hair, (2 k,)."""
-    return np.concatenate([omega * (1.0 + SHIFT), omega * (1.0 - SHIFT)])
+def _about(
+    omega: FloatArray, values: ComplexArray, on: IntArray, at: IntArray
+) -> tuple[FloatArray, ComplexArray]:
+    """Return the known points about some, (n, c), and what the curves are there."""
+    count = min(_NODES, omega.size)
+    near = np.clip(at - count // 2, 0, omega.size - count) + np.arange(count)[:, None]
+    return omega[near], values[on, near]
 
 
-_BESIDE = np.array([[-1], [0], [1]])
+def _interpolated(nodes: FloatArray, known: ComplexArray, at: FloatArray) -> ComplexArray:
+    """Return curves known at nodes, (n, c), elsewhere, (..., c), as rational functions.
+
+    By Thiele's continued fraction, which follows a resonance; no number where it breaks down.
+    """
+    terms = np.array(known, np.complex128)
+    for k in range(1, len(terms)):
+        terms[k:] = (nodes[k:] - nodes[k - 1]) / (terms[k:] - terms[k - 1])
+    found = np.broadcast_to(terms[-1], at.shape)
+    for k in reversed(range(len(terms) - 1)):
+        found = terms[k] + (at - nodes[k]) / found
+    return np.asarray(found)
 
 
-def _vertex(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return place and height of the vertex of parabolas through three points each, (3, c)."""
+def _vertex(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the vertices of parabolas through three points each, (3, c), between them."""
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
     bend = (right - left) / (x[2] - x[0])
     slope = left + bend * (x[1] - x[0])
-    step = -0.5 * slope / np.where(bend < 0.0, bend, -np.inf)
-    return x[1] + step, y[1] + 0.5 * slope * step
+    step = -0.5 * slope / np.where(bend > 0.0, bend, np.inf)
+    return np.asarray(np.clip(x[1] + step, x[0], x[2]))

@@ -23,14 +23,14 @@ brings twenty.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, Quadrature
+from models.basics import BoolArray, FloatArray, Quadrature
 
 from ..limits import Limit
 from ..loop import Coefficients, Dual, LoopResponses, exp, real, sqrt, squared, value_of
@@ -44,6 +44,7 @@ from ..question import (
     Problem,
     Values,
     moment_weights,
+    on_sides,
 )
 from .sqp import Descent, Evaluation, descend
 
@@ -453,22 +454,24 @@ class _Loop:
         reference: FloatArray,
     ) -> None:
         problem = self.problem = members[0].problem
-        self.omega = omega
         self.weights = [moment_weights(member.problem, nodes) for member in members]
+        self.omega, still = on_sides(problem, omega)
+        slow, slow_still = on_sides(problem, np.array([problem.slow_point]))
         self._blocks = (
             problem.blocks(1j * nodes.omega),
-            problem.margin_blocks(1j * omega),
-            problem.margin_blocks([problem.slow_point]),
+            problem.margin_blocks(1j * omega).repeated(slow.size),
+            problem.margin_blocks(slow[:1]).repeated(slow.size),
         )
         self._s = np.concatenate([blocks.s for blocks in self._blocks])
-        ends = [0, nodes.omega.size, nodes.omega.size + omega.size, self._s.size]
+        self._still = np.concatenate([np.zeros(nodes.omega.size, np.bool_), still, slow_still])
+        ends = np.cumsum([0, *(blocks.s.size for blocks in self._blocks)]).tolist()
         self._parts = [slice(*pair) for pair in pairwise(ends)]
         # Reference coefficients: the loop as the plant holds it.
         known = [element.reference for element in problem.elements]
         begin = Point(values=list(members[0].values(reference)), coefficients=known)
         self._scales = np.array([p.scale for p in problem.law.parameters])
-        slow = self._blocks[-1]
-        there = LoopResponses(slow, begin.closing(problem, slow.s)).determinant()
+        last = self._blocks[-1]
+        there = LoopResponses(last, begin.closing(problem, last.s)).determinant()
         self._there = float(np.real(there[0]))
 
     def at(
@@ -487,18 +490,11 @@ class _Loop:
             coefficients=np.exp(logs).tolist(),
             slopes=slopes,
         )
-        closing = point.closing(self.problem, self._s)
-        cost, *both = (
+        closing = point.closing(self.problem, self._s, self._still)
+        cost, margins, slow = (
             LoopResponses(blocks, closing.part(part))
             for blocks, part in zip(self._blocks, self._parts, strict=True)
         )
-        margins, slow = ([one] for one in both)
-        for still in point.sides(self.problem)[1:]:
-            closing = still.closing(self.problem, self._s)
-            for found, blocks, part in zip(
-                (margins, slow), self._blocks[1:], self._parts[1:], strict=True
-            ):
-                found.append(LoopResponses(blocks, closing.part(part)))
         count = values.size + logs.size
         numbers = LoopNumbers(
             self.problem,
@@ -513,15 +509,14 @@ class _Loop:
             ],
             extra=_variable(extra, -1, count, extra, slopes),
             goal=goal,
+            fresh=partial(self._fresh, point) if exact else None,
         )
-        if exact:
-            numbers.measure(lambda w, d: self._fresh(w, replace(point, slopes=d)))
-        return numbers, [self._no_slow_pole(one, extra) for one in slow]
+        return numbers, [self._no_slow_pole(slow, extra)]
 
-    def _fresh(self, omega: FloatArray, point: Point) -> list[LoopResponses]:
-        """Return the closed loop at other frequencies, at each side of the point."""
+    def _fresh(self, point: Point, omega: FloatArray, still: BoolArray) -> LoopResponses:
+        """Return the closed loop at other frequencies, without losses where `still` is true."""
         blocks, problem = self.problem.margin_blocks(1j * omega), self.problem
-        return [LoopResponses(blocks, p.closing(problem, blocks.s)) for p in point.sides(problem)]
+        return LoopResponses(blocks, point.closing(problem, blocks.s, still))
 
     def _no_slow_pole(self, slow: LoopResponses, extra: float | None) -> Any:
         """Return a row that keeps real poles from crossing -decay.

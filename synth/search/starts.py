@@ -19,7 +19,7 @@ from scipy.stats import qmc
 
 from models.basics import FloatArray
 
-from ..loop import LoopBlocks, LoopResponses
+from ..loop import LoopBlocks, LoopResponses, Shaking
 from ..question import (
     FamilyProblem,
     LoopNumbers,
@@ -27,6 +27,7 @@ from ..question import (
     Problem,
     Values,
     moment_weights,
+    on_sides,
 )
 from ..structures import pace
 from .nodes import around, cost_nodes, margin_nodes
@@ -236,9 +237,10 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
         problem = first.problem
         poles = around([problem.loop_poles(first.values(p)) for p in sample])
         nodes = cost_nodes(problem, poles, "rough")
-        omega = margin_nodes(problem, poles, _PER_DECADE)
+        omega, still = on_sides(problem, margin_nodes(problem, poles, _PER_DECADE))
         parts = problem.blocks(1j * nodes.omega), problem.margin_blocks(1j * omega)
         every = np.concatenate([part.s for part in parts])
+        still = np.append(np.zeros(nodes.omega.size, np.bool_), still)
         weights = [moment_weights(family.scenarios[i].problem, nodes) for i in group]
         for begin in range(0, len(points), _AT_ONCE):
             some = slice(begin, begin + _AT_ONCE)
@@ -247,14 +249,12 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
             ]
             known = _consistent(problem, own, parts[0], weights[0])
             point = Point(values=own, coefficients=known)
-            closing = point.closing(problem, every)
+            closing = point.closing(problem, every, still)
             cuts = slice(0, nodes.omega.size), slice(nodes.omega.size, None)
-            cost, *margins = (
+            cost, margins = (
                 LoopResponses(part, closing.part(cut))
                 for part, cut in zip(parts, cuts, strict=True)
             )
-            for still in point.sides(problem)[1:]:
-                margins.append(LoopResponses(parts[1], still.closing(problem, parts[1].s)))
             numbers = LoopNumbers(problem, cost, margins, weights[0], omega, point)
             for k, i in enumerate(group):
                 member = family.scenarios[i].problem
@@ -273,13 +273,15 @@ def _merits(family: FamilyProblem, points: FloatArray) -> list[FloatArray]:
 
 
 def _consistent(
-    problem: Problem, values: Sequence[FloatArray], blocks: LoopBlocks, weights: FloatArray
+    problem: Problem, values: Sequence[FloatArray], blocks: LoopBlocks, shaking: Shaking
 ) -> list[FloatArray]:
     """Return the coefficients that agree with the motion of many candidates, (b, 1) each."""
     known = [np.full((len(values[0]), 1), begin) for begin in problem.begin]
     names = [element.velocity for element in problem.elements]
     for _ in range(_DRAGS if names else 0):
         closing = Point(values=values, coefficients=known).closing(problem, blocks.s)
-        variances = LoopResponses(blocks, closing).moments(names, weights, [0])
-        known = problem.coefficients_in(dict(zip(names, variances, strict=True)).__getitem__)
+        pairs = [(name, name) for name in names]
+        every = LoopResponses(blocks, closing).integrals(pairs, shaking, [0])
+        variances = dict(zip(names, every[:, 0, ..., :1], strict=True))
+        known = problem.coefficients_in(variances.__getitem__)
     return known
