@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -142,7 +142,8 @@ def on_sides(problem: Problem, points: npt.NDArray[Any]) -> tuple[npt.NDArray[An
 
 #: From frequencies [rad/s], (k,), and where losses are none to the closed loop there.
 Fresh = Callable[[FloatArray, BoolArray], LoopResponses]
-Take = Callable[[LoopResponses], Any]
+#: A loop by its input, or a response by its ends.
+Curve = int | tuple[str, str]
 
 
 class LoopNumbers:
@@ -190,7 +191,7 @@ class LoopNumbers:
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
         self._fresh = fresh
         self._signs = np.zeros((1, len(shaking.shares)))
-        self._curves: dict[tuple[str, str] | None, list[Any]] = {}
+        self._grid: dict[Curve, Any] = {}
         self._peaks: dict[tuple[str, float], Any] = {}
 
     def under(self, problem: Problem, shaking: Shaking) -> LoopNumbers:
@@ -205,7 +206,7 @@ class LoopNumbers:
     @cached_property
     def differences(self) -> list[Any]:
         """1 + L of every loop at the margin frequencies, (k,) each."""
-        return self._on_grid(None)
+        return [self._on_grid(of) for of in self._curves_of(None)]
 
     @property
     def module_margin(self) -> float:
@@ -225,10 +226,10 @@ class LoopNumbers:
 
         def curves(at: FloatArray, side: IntArray, cuts: Sequence[slice]) -> list[Any]:
             loop = fresh(at, side > 0)
-            return [
-                self._padded(take(loop))[..., cut] if cut.start < cut.stop else None
-                for (_, take, _), cut in zip(sought, cuts, strict=True)
-            ]
+            every = [*zip((of for _, of, _ in sought), cuts, strict=True)]
+            asked = {of for of, cut in every if cut.start < cut.stop}
+            whole = {of: self._padded(_curve(loop, of)) for of in asked}
+            return [whole[of][..., cut] if of in whole else None for of, cut in every]
 
         found: dict[str, list[tuple[FloatArray, Any]]] = {key: [] for key, _, _ in sought}
         searches = [search for _, _, search in sought]
@@ -236,52 +237,46 @@ class LoopNumbers:
             found[key] += [] if place is None else [place]
         return found
 
-    def _sought(self) -> list[tuple[str, Take, Search]]:
-        """Return the places that limits ask for, of each curve: whose, how to take it, search."""
+    def _sought(self) -> list[tuple[str, Curve, Search]]:
+        """Return the places that limits ask for, of each curve: whose, what curve, the search."""
         limits, sides = self._problem.limits, self._sides
         omega = self.omega[: self.omega.size // sides]
-        found: list[tuple[str, Take, Search]] = []
-        for take, d in zip(self._takes(None), self.differences, strict=True):
+        found: list[tuple[str, Curve, Search]] = []
+        for i, d in enumerate(self.differences):
             gain = value_of(d).reshape(sides, -1) - 1.0
             if any(isinstance(limit, GainMargin | GainMarginDown) for limit in limits):
                 behind = (np.abs(gain) > _FAINT) & (gain.real < 0.0)
-                search = crossings(omega, gain, _height, behind)
-                found.append((_AXIS, take, search))
+                found.append((_AXIS, i, crossings(omega, gain, _height, behind)))
             if any(isinstance(limit, DelayMargin) for limit in limits):
-                found.append((_CIRCLE, take, crossings(omega, gain, _excess)))
+                found.append((_CIRCLE, i, crossings(omega, gain, _excess)))
         for limit in limits:
             if limit.followed is None:
                 continue
-            curves = zip(self._takes(limit.channel), self._on_grid(limit.channel), strict=True)
-            for take, curve in curves:
-                values = value_of(curve).reshape(sides, -1)
-                found.append((limit.name, take, peaks(omega, values, *limit.followed)))
+            for of in self._curves_of(limit.channel):
+                values = value_of(self._on_grid(of)).reshape(sides, -1)
+                found.append((limit.name, of, peaks(omega, values, *limit.followed)))
         return found
 
     @property
     def _sides(self) -> int:
         return on_sides(self._problem, np.zeros(1))[0].size
 
-    def _takes(self, channel: tuple[str, str] | None) -> list[Take]:
-        """Return how to take the curves that a limit is on from a closed loop."""
-        if channel is not None:
-            return [lambda loop: loop.response(*channel)]
-        inputs = range(len(self._problem.plant.inputs))
-        return [partial(_difference, index=i) for i in inputs]
+    def _curves_of(self, channel: tuple[str, str] | None) -> list[Curve]:
+        """Return the curves that a limit is on."""
+        return [*range(len(self._problem.plant.inputs))] if channel is None else [channel]
 
-    def _on_grid(self, channel: tuple[str, str] | None) -> list[Any]:
-        """Return the curves that a limit is on at the margin frequencies."""
-        if channel not in self._curves:
-            takes = self._takes(channel)
-            self._curves[channel] = [self._padded(take(self._margins)) for take in takes]
-        return self._curves[channel]
+    def _on_grid(self, of: Curve) -> Any:
+        """Return a curve at the margin frequencies."""
+        if of not in self._grid:
+            self._grid[of] = self._padded(_curve(self._margins, of))
+        return self._grid[of]
 
     def curves(self, limit: Limit) -> list[tuple[FloatArray, Any]]:
         """Return the curves that a limit is on, at the margin frequencies and at peaks between.
 
         See `synth.limits.Symbols`.
         """
-        found = [(self.omega, curve) for curve in self._on_grid(limit.channel)]
+        found = [(self.omega, self._on_grid(of)) for of in self._curves_of(limit.channel)]
         if self._fresh is not None:
             found += self._followed.get(limit.name, [])
         return found
@@ -460,8 +455,8 @@ class LoopNumbers:
         return Dual(found.value, np.concatenate([found.slope, np.zeros_like(found.slope[:1])]))
 
 
-def _difference(loop: LoopResponses, index: int) -> Any:
-    return loop.difference(index)
+def _curve(loop: LoopResponses, of: Curve) -> Any:
+    return loop.difference(of) if isinstance(of, int) else loop.response(*of)
 
 
 def _counted(poles: ComplexArray, models: ComplexArray) -> tuple[BoolArray, BoolArray]:

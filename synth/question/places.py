@@ -27,10 +27,10 @@ IntArray = npt.NDArray[np.intp]
 Search = Generator[tuple[FloatArray, IntArray], ComplexArray, None]
 
 _SHIFT = 1e-6  # relative, of a frequency, of differences
-_NODES, _FINE = 5, 33  # known points that interpolation takes, and how finely it is looked at
+_NODES, _FINE = 7, 33  # known points that interpolation takes, and how finely it is looked at
 _ROUNDS = 4
-_FORETOLD = 1e-8  # relative error of interpolation at a peak that counts as none
-_HAIR = 1e-6  # of the distance of known points: a last step of Newton's towards a crossing
+_FORETOLD = 1e-7  # relative error of interpolation at a peak that counts as none
+_HAIR = 1e-4  # of the distance of known points: a last step of Newton's towards a crossing
 
 
 def together(
