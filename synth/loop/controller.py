@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,26 @@ from models.plant import LinearPlant, Resolvent, Transfer
 
 if TYPE_CHECKING:
     import control
+
+
+class StateSpace(Protocol):
+    """Whatever has the matrices of x' = A x + B u, y = C x + D u: a plant, or a controller."""
+
+    @property
+    def A(self) -> FloatArray:
+        """From states to their rates, (n, n)."""
+
+    @property
+    def B(self) -> FloatArray:
+        """From inputs to the rates of states, (n, nu)."""
+
+    @property
+    def C(self) -> FloatArray:
+        """From states to measurements, (ny, n)."""
+
+    @property
+    def D(self) -> FloatArray:
+        """From inputs to measurements, (ny, nu)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,20 +131,20 @@ def closed_loop_plant(plant: LinearPlant, controller: LinearController) -> Linea
     return plain.with_feedback(controller.A, controller.B, controller.C, controller.D)
 
 
-def closed_loop_matrix(plant: LinearPlant, controller: LinearController) -> FloatArray:
+def closed_loop_matrix(plant: StateSpace, controller: StateSpace) -> FloatArray:
     """Return the state matrix of plant and controller in a loop, (n + nk, n + nk).
 
     Delays of the plant are ignored: replace them first (`LinearPlant.without_delays`).
     """
-    inverse = np.linalg.inv(np.eye(len(plant.inputs)) - controller.D @ plant.D)
+    inverse = np.linalg.inv(np.eye(plant.D.shape[1]) - controller.D @ plant.D)
     on_plant, on_states = inverse @ controller.D @ plant.C, inverse @ controller.C
-    heard = plant.C + plant.D @ on_plant
-    return np.block(
-        [
-            [plant.A + plant.B @ on_plant, plant.B @ on_states],
-            [controller.B @ heard, controller.A + controller.B @ plant.D @ on_states],
-        ]
-    )
+    n = len(plant.A)
+    found = np.empty((n + len(controller.A),) * 2)  # np.block takes as long as all products
+    found[:n, :n] = plant.A + plant.B @ on_plant
+    found[:n, n:] = plant.B @ on_states
+    found[n:, :n] = controller.B @ (plant.C + plant.D @ on_plant)
+    found[n:, n:] = controller.A + controller.B @ plant.D @ on_states
+    return found
 
 
 def closed_loop_poles(plant: LinearPlant, controller: LinearController) -> ComplexArray:

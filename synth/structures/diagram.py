@@ -20,13 +20,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import block_diag
 
 from models.basics import FloatArray, pick
 from models.plant import LinearPlant
 
 from ..loop import LinearController, closed_loop_matrix
-from .blocks import FilterSection, Matrices, series
+from .blocks import FilterSection
 from .structure import Bounds, Parameter, ParametrisedController, check_bounds
 
 #: From the parameters by name to the weight of a measurement; sums and products only.
@@ -99,23 +98,30 @@ class DiagramLaw(ParametrisedController):
 
     def controller(self, values: Sequence[float]) -> LinearController:
         """Return the controller in state space; it has zeros for what it does not hear."""
-        parts, ny = [], len(self._plant.measurements)
-        for weights, sections in self._numbered(values):
-            row = np.zeros((1, ny))
-            row[0, list(weights)] = list(weights.values())
-            part: Matrices = np.zeros((0, 0)), np.zeros((0, ny)), np.zeros((1, 0)), row
-            for section, own in sections:
-                part = series(part, section.matrices([float(v) for v in own]))
-            parts.append(part)
-        A, B, C, D = zip(*parts, strict=True)
-        return LinearController(
-            A=block_diag(*A),
-            B=np.vstack(B),
-            C=np.hstack(C),
-            D=sum(D[1:], D[0]),
-            measurements=self._plant.measurements,
-            inputs=self._plant.inputs,
-        )
+        ny = len(self._plant.measurements)
+        branches = [
+            (weights, [section.matrices([float(v) for v in own]) for section, own in sections])
+            for weights, sections in self._numbered(values)
+        ]
+        n = sum(len(part[0]) for _, parts in branches for part in parts)
+        A, B, C, D = (np.zeros(shape) for shape in ((n, n), (n, ny), (1, n), (1, ny)))
+        at = 0
+        for weights, parts in branches:
+            # The signal behind each section, of the states and of what is measured.
+            of_states, of_measured = np.zeros(n), np.zeros(ny)
+            of_measured[list(weights)] = list(weights.values())
+            for own, into, out, direct in parts:
+                states = slice(at, at + len(own))
+                A[states] = into * of_states
+                A[states, states] = own
+                B[states] = into * of_measured
+                of_states, of_measured = of_states * direct[0, 0], of_measured * direct[0, 0]
+                of_states[states] = out[0]
+                at = states.stop
+            C[0] += of_states
+            D[0] += of_measured
+        names = self._plant.measurements, self._plant.inputs
+        return LinearController(A=A, B=B, C=C, D=D, measurements=names[0], inputs=names[1])
 
     def _numbered(
         self, values: Sequence[Any]

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from models.plant import LinearPlant
 from synth.loop import Dual
+from synth.structures import Parameter
 from synth.structures.blocks import (
     FilterSection,
     integral,
@@ -17,6 +19,7 @@ from synth.structures.blocks import (
     roll_off,
     series,
 )
+from synth.structures.diagram import Branch, DiagramLaw
 
 SECTIONS: dict[str, FilterSection] = {
     "roll-off": roll_off("f", corner=(0.5, 50.0)),
@@ -92,3 +95,22 @@ def test_series_is_the_product() -> None:
     found = [(C @ np.linalg.solve(p * np.eye(len(A)) - A, B) + D)[0, 0] for p in s]
     wanted = np.asarray(first.response(one, s)) * np.asarray(then.response(two, s))
     assert wanted == pytest.approx(np.array(found), rel=1e-12)
+
+
+class Drawn(DiagramLaw):
+    def draw(self, points, omega, yu):
+        return points
+
+
+def test_sections_in_a_row_are_the_product_and_branches_add() -> None:
+    first, then = SECTIONS["notch"], integral("g", corner=(0.01, 1.0))
+    one, two = values_of(first, 0.3), values_of(then, 0.6)
+    plant = LinearPlant(A=[[-1.0]], B=[[1.0]], E=[[1.0]], C=[[1.0], [2.0]])
+    filtered = Branch(weights={"y1": lambda p: p["k"], "y2": lambda _: 2.0}, sections=(first, then))
+    branches = [filtered, Branch(weights={"y2": lambda _: 3.0})]
+    law = Drawn(plant, branches, [Parameter(name="k", scale=1.0)], {})
+    s = 1j * OMEGA
+    both = np.asarray(first.response(one, s)) * np.asarray(then.response(two, s))
+    wanted = np.stack([5.0 * both, 2.0 * both + 3.0], axis=1)
+    found = law.controller([5.0, *one, *two]).response_at(s)[:, 0]
+    assert found == pytest.approx(wanted, rel=1e-12)
