@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range
+from models.basics import ComplexArray, FloatArray, InputError, check_range
 
 from ..loop import Coefficients, Disturbance
 from ..structures import Parameter
@@ -178,23 +178,20 @@ class FamilyProblem:
         largest = -np.inf
         for group in self.groups:
             scenario = self.scenarios[group[0]]
-            problem, own = scenario.problem, scenario.values(values)
-            largest = max(largest, problem.abscissa(own))
-            if largest < enough and problem.swings(own):
-                largest = max(largest, problem.abscissa(own, problem.nothing))
-            if largest >= enough:
-                break
+            for found in scenario.problem.abscissas(scenario.values(values)):
+                largest = max(largest, found)
+                if largest >= enough:
+                    return largest
         return largest
 
     def growth(self, values: Values) -> float:
-        """Return the largest real part of a pole of any loop [1/s], with drag and without."""
-        firsts = [self.scenarios[group[0]] for group in self.groups]
-        found = [s.problem.growth(s.values(values)) for s in firsts]
-        for s in firsts:
-            if s.problem.dragged:
-                poles = s.problem.loop_poles(s.values(values), s.problem.nothing)
-                found.append(float(poles.real.max()))
-        return max(found)
+        """Return the largest real part of any loop's lively poles [1/s], with drag and without."""
+        found: list[ComplexArray] = []
+        for scenario in (self.scenarios[group[0]] for group in self.groups):
+            problem = scenario.problem
+            asked = [None, problem.nothing] if problem.dragged else [None]
+            found += problem.lively_poles(scenario.values(values), *asked)
+        return max(float(poles.real.max(initial=-np.inf)) for poles in found)
 
     def total(self, costs: Sequence[float] | FloatArray) -> float:
         """Return what the objective makes of the scenarios' costs."""

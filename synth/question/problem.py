@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -21,6 +21,7 @@ from ..loop import (
     Disturbance,
     Element,
     LoopBlocks,
+    LoopModel,
     with_delay_models,
     with_elements,
     without_losses,
@@ -136,22 +137,43 @@ class Problem:
             plant = with_elements(plant, self.elements, coefficients)
         return self.law.closed_loop_matrix(plant, [float(v) for v in values])
 
+    def lively_poles(self, values: Values, *asked: Coefficients | None) -> Iterator[ComplexArray]:
+        """Yield the closed loop's poles [1/s] for sets of coefficients, each when it is asked for.
+
+        On as few states as that takes (`synth.loop.LoopModel`), so without damped poles of the
+        plant that no loop moves: what stability is asked of.
+        """
+        controller, model = self.law.controller([float(v) for v in values]), self._loop_model
+        references = [element.reference for element in self.elements]
+        for coefficients in asked:
+            known = references if coefficients is None else coefficients
+            gains = [r - c for r, c in zip(references, known, strict=True)]
+            poles = np.linalg.eigvals(model.closed(controller, gains))
+            yield np.asarray(poles, dtype=np.complex128)
+
+    @cached_property
+    def _loop_model(self) -> LoopModel:
+        return LoopModel.of(with_delay_models(self._opened)[0])
+
     def growth(self, values: Values) -> float:
         """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
         return float(self.loop_poles(values).real.max(initial=-np.inf))
 
+    def abscissas(self, values: Values) -> Iterator[float]:
+        """Yield `abscissa`, then that without drag if the loop swings by itself there."""
+        found = map(_abscissa, self.lively_poles(values, None, self.nothing))
+        yield next(found)
+        if self.dragged and (calm := next(found)) > _DECAY:
+            yield calm
+
     def abscissa(self, values: Values, coefficients: Coefficients | None = None) -> float:
-        """Return the largest real part of a closed-loop pole over the size of the largest."""
-        poles = self.loop_poles(values, coefficients)
-        return float(poles.real.max(initial=-1.0) / max(1.0, float(np.abs(poles).max(initial=1.0))))
+        """Return the largest real part of a lively pole over the size of the largest."""
+        return _abscissa(next(self.lively_poles(values, coefficients)))
 
     def held(self, values: Values, coefficients: Coefficients | None = None) -> bool:
         """Return whether the closed loop is stable with these coefficients, without losses too."""
-        if not self.abscissa(values, coefficients) < -_DECAY:
-            return False
-        if coefficients is None or (still := self.still(coefficients)) == list(coefficients):
-            return True
-        return self.abscissa(values, still) < -_DECAY
+        found = self.lively_poles(values, *self._sides(coefficients))
+        return all(_abscissa(poles) < -_DECAY for poles in found)
 
     def swings(self, values: Values) -> bool:
         """Return whether the closed loop swings by itself in small motion.
@@ -163,7 +185,19 @@ class Problem:
 
     def stable(self, values: Values, coefficients: Coefficients | None = None) -> bool:
         """Return whether the closed loop is stable, with these coefficients and in small motion."""
-        return self.held(values, coefficients) and not self.swings(values)
+        asked = dict.fromkeys(self._sides(coefficients), -_DECAY)
+        if self.dragged:
+            asked.setdefault(tuple(self.nothing), _DECAY)
+        found = self.lively_poles(values, *asked)
+        return all(
+            _abscissa(poles) < most for poles, most in zip(found, asked.values(), strict=True)
+        )
+
+    def _sides(self, coefficients: Coefficients | None) -> list[tuple[float, ...] | None]:
+        """Return the coefficients given, and those without losses if they are others."""
+        if coefficients is None:
+            return [None]
+        return [*dict.fromkeys([tuple(coefficients), tuple(self.still(coefficients))])]
 
     def assess(self, values: Values, coefficients: Coefficients | None = None) -> Assessment:
         """Return the closed loop in numbers, its elements solved for where nothing is given."""
@@ -174,3 +208,9 @@ class Problem:
             elements=self.elements,
             coefficients=coefficients,
         )
+
+
+def _abscissa(poles: ComplexArray) -> float:
+    """Return the largest real part over the size of the largest pole."""
+    size = max(1.0, float(np.abs(poles).max(initial=1.0)))
+    return float(poles.real.max(initial=-1.0)) / size
