@@ -7,8 +7,6 @@ where the three names lead.  Looking them up costs a few file system calls and r
 their code.
 """
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -7,8 +7,6 @@ verified), or a run diverged; 2 bad input; 3 an error in Stillhook itself; 130 i
 commands are imported when they run, so that ``stillhook --help`` imports nothing heavy.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

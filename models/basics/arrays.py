@@ -1,7 +1,5 @@
 """Arrays of numbers by their names: `FloatArray`, `ComplexArray`, `BoolArray`, `IndexArray`."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

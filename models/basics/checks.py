@@ -7,8 +7,6 @@ exception family and the helpers that word those sentences; it imports nothing o
 every other module may use it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import fields
@@ -17,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import FloatArray
+from .arrays import ComplexArray, FloatArray
 
 
 class StillhookError(Exception):
@@ -152,15 +150,18 @@ class ReadOnlyArrays:
 
     def __post_init__(self) -> None:
         for field in fields(self):  # type: ignore[arg-type]
-            if field.type in _KINDS:
-                copy: npt.NDArray[Any] = np.array(
-                    getattr(self, field.name), dtype=_KINDS[field.type]
-                )
+            kind = _KINDS.get(field.type)
+            if kind is not None:
+                copy: npt.NDArray[Any] = np.array(getattr(self, field.name), dtype=kind)
                 copy.setflags(write=False)
                 object.__setattr__(self, field.name, copy)
 
 
-_KINDS = {"FloatArray": np.float64, "ComplexArray": np.complex128}
+# Annotations are texts where a file puts off their evaluation.
+_KINDS: dict[Any, Any] = {
+    **dict.fromkeys((FloatArray, "FloatArray"), np.float64),
+    **dict.fromkeys((ComplexArray, "ComplexArray"), np.complex128),
+}
 
 
 def digits_apart(value: float, bound: float, least: int = 3) -> int:

@@ -1,7 +1,5 @@
 """Files: read whole, plain or packed with gzip; written atomically; and the cache folder."""
 
-from __future__ import annotations
-
 import contextlib
 import gzip
 import os

@@ -5,8 +5,6 @@ end the process, and neither can be caught from inside.  So a file is read throu
 process with a time limit, before anybody opens it here.  That costs a few tenths of a second.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -6,8 +6,6 @@ interval of Epstein and Sobel (1953).  `models/run/metrics.py` applies them to r
 their seed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

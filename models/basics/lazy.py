@@ -4,8 +4,6 @@ A face lists what it hands on under ``if TYPE_CHECKING``, so that type checkers,
 contract and readers all see the same list, and nothing has to be written twice.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable
 from importlib import import_module

@@ -8,8 +8,6 @@ probable maximum in a given time, sigma sqrt(2 ln(T / T_z)) (Longuet-Higgins 195
 and 2 sigma for an amplitude.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

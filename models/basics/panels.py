@@ -4,8 +4,6 @@ Behind :mod:`models.basics.quadrature`: log-frequency, optionally continued to z
 cut at kinks and refined towards poles.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Iterable, Sequence

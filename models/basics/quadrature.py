@@ -19,8 +19,6 @@ one norm over all integrands (a torque variance of 1e7 would drown a displacemen
 1e-4) and call the integrand one panel at a time.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ and refined by Newton's method (Kleinman 1968), which also says how well it is s
 discrete equations are solved by doubling.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

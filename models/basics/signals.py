@@ -1,7 +1,5 @@
 """Signals: the names, delays and rates that they go by, and white noise."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -5,8 +5,6 @@ each product over all cores and spends its time waiting for them: on two busy co
 took 50 s instead of 8 s.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Iterator
 from contextlib import contextmanager

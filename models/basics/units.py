@@ -7,8 +7,6 @@ field wants is its *kind* (a length, a frequency, ...), so `0.1 Hz` becomes 0.62
 frequency is wanted and is refused where a time is.  A plain number is always SI.
 """
 
-from __future__ import annotations
-
 import math
 import numbers
 import re

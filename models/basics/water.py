@@ -4,8 +4,6 @@ Source: omega^2 = g k tanh(k d), Airy's theory.  The start is Guo's explicit for
 0.75 % at any depth; three Newton steps then reach the last digit.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

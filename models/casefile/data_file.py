@@ -6,8 +6,6 @@ which `load_case` passes).  Without a folder, as in `case.replace`, it is relati
 that the program runs in.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ Each error is one line, `file:line: field.path: must be ..., got ...`; unknown k
 suggestion.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Dotted paths: a case as plain data, and changing fields of it by path."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -5,8 +5,6 @@ text such as `44 mm`, holds a float in SI, refuses what lies outside the range, 
 describe itself in an error message, in the JSON Schema and in the documentation.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import KW_ONLY, dataclass

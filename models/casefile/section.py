@@ -8,8 +8,6 @@ the field it is about, so that the message can name the line.
 path of a discriminated union are taken out again by walking the section classes along it.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, Self, get_args, get_origin

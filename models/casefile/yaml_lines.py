@@ -5,8 +5,6 @@ is a word; PyYAML and the C parser follow 1.1, in which they are a text and Fals
 composed into nodes once: the nodes give the lines and the repeated keys, and the data.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -8,8 +8,6 @@ the water.  What moves beside the hook, a supply boat's deck and the water's sur
 the hook's motion is: a spectrum times an RAO, from a seed.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Mapping

@@ -8,8 +8,6 @@ of lost messages is ``sensors.telemetry.dropout``, the bias of a payload sensor
 ``sensors.payload.displacement_bias``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, replace

@@ -6,8 +6,6 @@ angular frequency omega is met within (omega h)^6/46080 of its amplitude, with h
 the nodes.  `models.operation.excitation` reads long motions through it, in blocks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -7,8 +7,6 @@ The recipes of `models.operation.scenarios` and `models.operation.contact_scenar
 made of them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

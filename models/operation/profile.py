@@ -4,8 +4,6 @@ Moves have a limited speed and acceleration.  Each starts at its own time, from 
 that overlap add up.  `models.operation.scenario` is made of these.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ Times count from the start of the run.  The payload's set-point is a displacemen
 hangs at rest at the start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType

@@ -7,8 +7,6 @@ holding, engaging, moving the set-point, and what fails meanwhile; those with a 
 the surface are in `models.operation.contact_scenarios`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

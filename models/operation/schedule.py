@@ -4,8 +4,6 @@ Every number depends on its own time alone, so it does not matter in which piece
 cut.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

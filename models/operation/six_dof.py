@@ -14,8 +14,6 @@ and exactly, for the rotation matrix R = R_z(yaw) R_y(pitch) R_x(roll),
 Surge, sway and yaw move the tip sideways only.  `models.operation.record_file` reads files of them.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ Each is one matrix exponential of the system with what drives it behind it (C. V
 integrals involving the matrix exponential", IEEE TAC 23, 1978).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg
 

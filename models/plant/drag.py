@@ -7,8 +7,6 @@ Gaussian motion that the plant itself makes with it (stochastic linearisation), 
 the motion have to be found together: `consistent_drag`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

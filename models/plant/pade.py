@@ -4,8 +4,6 @@ Frequency responses carry delays exactly; eigenvalues and Lyapunov equations can
 `LinearPlant.without_delays` and `LinearPlant.to_control` put this model in their place.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache

@@ -10,8 +10,6 @@ A conjugate pair is taken together, r/(s - lambda) + r*/(s - lambda*) =
 matrices; a real pole, of which a hysteretic rope's branches bring many, costs one division a point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 

@@ -13,8 +13,6 @@ mass, which then is the hook block, with the payload as one more mass.
 a few springs with dampers, so that it is causal and rational, the same in frequency and in time.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Mapping

@@ -15,8 +15,6 @@ sec. 8.2).  The poles are stable by construction; the m zeros at the origin take
 of the waves.  White noise has intensity one, a one-sided density of 1/pi.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -29,8 +29,6 @@ water has no such term.  The water's motion is that of the surface, decaying wit
 exp(-k depth).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields

@@ -15,8 +15,6 @@ chance alone, not of how far the law fits: on Gaussian waves, of which the truth
 law from 20-minute blocks is 0.8 % high at 3 h and 2.6 % at 10 h.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

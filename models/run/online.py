@@ -7,8 +7,6 @@ Means and variances are merged as in Chan, Golub and LeVeque (1983), which loses
 mean is large against the deviation, as a rope's tension is.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, TypeAlias
 

@@ -13,8 +13,6 @@ of the highest third of the cycles (Sverdrup and Munk 1947), not four standard d
 the cycles were too many to be kept it is.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 import sys

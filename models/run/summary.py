@@ -5,8 +5,6 @@ Made by `Accumulator` in `models/run/statistics.py`, kept by `Run`, compared ove
 SI and a unit, so that a table of them needs nothing else.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

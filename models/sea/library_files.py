@@ -5,8 +5,6 @@ becomes one sentence.  It is an extra, because it brings labelled arrays, a regi
 formats and seconds of import with it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import tempfile

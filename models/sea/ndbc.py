@@ -16,8 +16,6 @@ threshold would delete storms (`models.sea.quality`).  Both files may be packed 
 their columns separated by blanks or commas.
 """
 
-from __future__ import annotations
-
 import datetime
 import math
 import re

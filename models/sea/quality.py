@@ -7,8 +7,6 @@ threshold deletes the very storms that a design is for.  Only a whole sea state 
 half as high again as any ever measured, is taken for the error that it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Scatter diagrams as CSV files: a list of states or a matrix, read and written."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence

@@ -12,8 +12,6 @@ and Vincent, *J. Geophys. Res.* 90 (1985) 975 (TMA); Kitaigorodskii, Krasitskii 
 (Gaussian swell); Pierson and Moskowitz, *J. Geophys. Res.* 69 (1964) 5181.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -19,8 +19,6 @@ A motion's variance in such a sea is a mean of |H(omega, heading)|^2 over headin
 what is left of the law, (cos / (1 - x^2))^p, is analytic also where p is no integer.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

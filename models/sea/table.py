@@ -6,8 +6,6 @@ tail of every wind sea (buoys stop at 0.4 to 0.6 Hz, and a resonant loop still a
 `zero` is nothing.  `tail_share` tells how much hangs on that.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

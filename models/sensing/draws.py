@@ -5,8 +5,6 @@ A day at 10 ms has millions of samples, so the numbers come in blocks of a fixed
 seed of its own, and any stretch of them is the same however the run is cut into chunks.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Literal
 

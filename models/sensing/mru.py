@@ -22,8 +22,6 @@ series then needs one recursion of the first order, which runs at the speed of c
 can be cut anywhere.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ spectra takes these.  The names are those of a simulation's measurements (`model
 so what is designed here runs there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -9,8 +9,6 @@ time is therefore met by interpolation between two neighbouring messages: what i
 the signal at t - delay, not at the sample before it.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -15,8 +15,6 @@ The controller either is part of it, or is called in between: then the recursion
 `measure` and `advance`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

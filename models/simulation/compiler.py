@@ -8,8 +8,6 @@ before it is loaded.  No file is ever changed in place: several processes may bu
 at once.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import ctypes

@@ -13,8 +13,6 @@ change sign (stick and slip after D. Karnopp, "Computer simulation of stick-slip
 mechanical dynamic systems", ASME J. Dyn. Syst. Meas. Control 107, 1985).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ is compiled with it (`models.simulation.compiler`) and called through ctypes; ot
 virtual machine runs it, with the same numbers and about a tenth of the speed.
 """
 
-from __future__ import annotations
-
 import ctypes
 import functools
 from typing import Any

@@ -8,8 +8,6 @@ Everything that does not hang on the plant is made here, chunk by chunk, from th
 layout is that of `models.simulation.closed_loop`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

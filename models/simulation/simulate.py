@@ -17,8 +17,6 @@ then held, and the run counts how often and says when it happened first; the loa
 command that is not a number.
 """
 
-from __future__ import annotations
-
 import math
 import time as clock
 from collections.abc import Callable

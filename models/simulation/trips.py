@@ -6,8 +6,6 @@ brake closed, and the event says what happened.  `models.simulation.simulate` as
 sample.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A spread speaks of fields of a case, of gains of a design (``gains.a``) and of t
 drag coefficient (``drag``); this module is where their units are looked up.
 """
 
-from __future__ import annotations
-
 import math
 import typing
 from collections.abc import Callable, Mapping

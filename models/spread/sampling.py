@@ -5,8 +5,6 @@ row i of a Latin hypercube on the number of rows as well, as every row takes a s
 others then cannot have.  Any piece of a design can be had without the rest.
 """
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ What the readers share: text out of a file that may be anything, rows sorted int
 wave's point of zero phase brought to the origin, the headings that symmetry gives.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

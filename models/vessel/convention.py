@@ -15,8 +15,6 @@ for phases relative to the wave's crest, trough, zero up-crossing and zero down-
 (Orcina, *Vessel types: Conventions*), which states them all.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields

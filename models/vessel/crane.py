@@ -4,8 +4,6 @@ The rope leaves the vessel there, and the place decides: on an 80 m vessel in be
 crane moves two and a half times as much over one side as over the other.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..basics import FloatArray

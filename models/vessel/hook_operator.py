@@ -10,8 +10,6 @@ A case is read, changed and asked for its hook's motion again and again: files a
 long as they stay as they are, and the operators of a place and a sea are kept.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

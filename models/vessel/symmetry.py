@@ -6,8 +6,6 @@ as they are, sway, roll and yaw with the other sign.  Fore-and-aft symmetry turn
 yaw round; a body of revolution has one table for all headings.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -14,8 +14,6 @@ A table has ends, and a spectrum reaches beyond them.  What the RAO is out there
 the case, `below` and `beyond`, and :meth:`HeaveRao.share_outside` tells how much hangs on it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -9,8 +9,6 @@ Directions are those of `models.vessel`: x forward, y to port, z up; a heading i
 to port, 180 deg head sea.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator
 from typing import Annotated, Literal

@@ -20,8 +20,6 @@ without solving anything.  Of this is taken off what the regularisation could co
 any demand within its limits.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -16,8 +16,6 @@ open-loop motion would damp it for nothing.  ``drag=0`` tells how little hangs o
 the tests refine it on the nonlinear plant (`nonlinear_floor`).
 """
 
-from __future__ import annotations
-
 import math
 import time as clock
 from collections.abc import Callable

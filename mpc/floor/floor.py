@@ -6,8 +6,6 @@ The same code makes it of an answer that has just been found and of one from the
 nothing that was stored has to be believed.
 """
 
-from __future__ import annotations
-
 import time as clock
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -23,8 +23,6 @@ replaced by its chord from the base speed to the end of the speed band, the conv
 allows more.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -6,8 +6,6 @@ Motions are deviations from the one that holds the payload still, in which zero 
 wherever no limit binds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

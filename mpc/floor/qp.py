@@ -23,8 +23,6 @@ whatever its factorisation and the blocks' length, Clarabel 3.3, OSQP 35 without
 samples, 0.7 with the sparse one, Clarabel 6.9.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

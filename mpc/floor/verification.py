@@ -6,8 +6,6 @@ command that the demand comes to, the hook read from SciPy's cubic Hermite splin
 nothing but the plant's matrices.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

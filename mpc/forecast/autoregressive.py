@@ -32,8 +32,6 @@ of products are kept, not their inverse: they are bounded by the data, so that n
 nor a constant signal can blow them up, as happens to a covariance with forgetting.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Final

@@ -7,8 +7,6 @@ know which predictor stands behind it: `AdaptiveAR` (knows the record alone), `P
 (knows the future, for reference) or one of the user's own.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 

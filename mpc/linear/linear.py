@@ -6,8 +6,6 @@ r"""Linear model predictive control of the winch, one quadratic programme a samp
 the sensors show, and commands the drive.
 """
 
-from __future__ import annotations
-
 import math
 import time as clock
 

@@ -19,8 +19,6 @@ taken from the last plan; the voltage of a DC drive bounds the first move by the
 now.  The windings' temperature follows from the torque that the drive reports.
 """
 
-from __future__ import annotations
-
 import math
 import time as clock
 from abc import ABC, abstractmethod

@@ -9,8 +9,6 @@ model says: its state there is either as the filter expects it or as the path to
 likely (`sea_at_end`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ r"""Nonlinear model predictive control: a Gauss-Newton step a sample, in the pla
 the path of the hook are those of `WinchMPC`.
 """
 
-from __future__ import annotations
-
 import math
 import time as clock
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@ payload at samples 1 .. N - 1, the state at the end, the motor's speed at the st
 the rows of the linear programme.  `mpc.nonlinear.shooting` puts them together.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

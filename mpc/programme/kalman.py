@@ -6,8 +6,6 @@ Every measurement is taken in units of its own error, since a state of radians, 
 and sensors of any precision would leave nothing of a common scale.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

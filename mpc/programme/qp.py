@@ -14,8 +14,6 @@ Set up once; each sample brings a gradient and bounds, and begins with the activ
 `kkt_residual` checks an answer without the solver.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

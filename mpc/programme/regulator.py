@@ -21,8 +21,6 @@ It is what a predictive controller without active limits equals, and its value f
 of what lies beyond a horizon.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

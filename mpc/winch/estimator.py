@@ -10,8 +10,6 @@ covariance.  What comes late is compared with what was on its way at that age.
 A number that is not finite never gets in: a signal that shows one counts as missing.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -13,8 +13,6 @@ Only the plan is different.  The filter believes the case; what it finds at rest
 force is at rest for the plan too, so that nothing is left over.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

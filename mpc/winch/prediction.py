@@ -27,8 +27,6 @@ trusted less than they might be, buy robustness with a little of the performance
 `mpc.winch.weights` finds how much of each, `with_noise` puts it into a model.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace

@@ -5,8 +5,6 @@ What an unsaturated predictive controller equals, and the cost of what lies beyo
 the payload's displacement as the output, and the input that holds the load against the constants.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg
 

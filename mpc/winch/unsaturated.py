@@ -9,8 +9,6 @@ sensitivity M_s on the frequencies up to half the sample rate, and the rms of th
 modelled sea.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -13,8 +13,6 @@ Every evaluation is a Riccati equation, five Lyapunov equations and the poles of
 (`mpc.winch.unsaturated`): tens of milliseconds.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Mapping

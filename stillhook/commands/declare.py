@@ -6,8 +6,6 @@ Each command's module has such a tuple and a function ``run(arguments)``; `still
 tuple of the command that was asked for, and no other.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Mapping

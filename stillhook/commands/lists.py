@@ -4,8 +4,6 @@ Each returns what was meant from the option's name, for messages, and its text
 (`stillhook.commands.declare.Read`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

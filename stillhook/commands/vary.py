@@ -6,8 +6,6 @@
 --seas '1.5/8, 2.5/9:0.3'        H_s/T_p, and after a colon the occurrence
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

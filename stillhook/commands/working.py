@@ -3,8 +3,6 @@
 A computation that has something to keep is `stoppable`.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import signal

@@ -3,8 +3,6 @@
 CellBench --(to any process)--> do(CellTask) --> StoredDesign, Cell, Trace or Refused
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -11,8 +11,6 @@ The clairvoyant floor sees the same motion of the hook and is judged over the sa
 is linear, and every command within the drive's limits is open to it.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping

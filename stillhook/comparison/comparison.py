@@ -8,8 +8,6 @@ with the floor.  The payload's rms is about its place, so that a load that has s
 as still.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

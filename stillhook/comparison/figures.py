@@ -4,8 +4,6 @@ Each function returns a matplotlib `Figure`.  A contender has the same colour in
 is a shaded edge, because nothing can lie below it on the linear plant.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -6,8 +6,6 @@ Beside these lies `cells.jsonl`, from which the comparison goes on (`stillhook.c
 Every file is written whole or not at all.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

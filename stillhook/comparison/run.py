@@ -14,8 +14,6 @@ Designs come first, since runs wait for them.  A process is given what it has pr
 long as there is any.
 """
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import time as clock

@@ -3,8 +3,6 @@
 Cell, StoredDesign --> Store --> cells.jsonl --> Store --> what is there already
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

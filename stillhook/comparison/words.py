@@ -7,8 +7,6 @@ than either.  A difference is called one only where Student's 95 % interval of t
 leaves out zero.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

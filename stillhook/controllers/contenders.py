@@ -3,8 +3,6 @@
 names, designs, controllers, (name, function) --> contenders_of --> Contender ... --> compare
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

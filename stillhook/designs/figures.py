@@ -9,8 +9,6 @@ frequency and small at high: what matters is near -1, so the figure shows that n
 says what lies outside.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ Everything is in the sea that the design's figures hold for: the case's own, or 
 feasible one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

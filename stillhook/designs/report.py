@@ -5,8 +5,6 @@
 Whoever opens the folder a year later finds the question beside the answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Robust designs and gain schedules as figures, reports and tables of data."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sensitivity as figures and report: elasticities, steps of a size, variance over whole ranges."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

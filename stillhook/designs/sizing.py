@@ -1,7 +1,5 @@
 """Sizing, co-design, worth and Pareto fronts as figures and reports: what to buy, what it costs."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 Design -> Tables -> `stillhook.designs.report`
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

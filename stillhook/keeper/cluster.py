@@ -7,8 +7,6 @@ what they need.  At most a few tasks for each thread are under way at once, so t
 them burden no scheduler.  Needs the extra ``stillhook[cluster]``.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import pickle

@@ -7,8 +7,6 @@ the driver's, and stored studies say what made them: other code may give other n
 of both would be worth nothing.
 """
 
-from __future__ import annotations
-
 import ast
 import gc
 import hashlib

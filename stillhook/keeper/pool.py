@@ -7,8 +7,6 @@ task whose worker was killed is done once more, by another worker; one that kill
 with `Died`.
 """
 
-from __future__ import annotations
-
 import os
 from abc import ABC, abstractmethod
 from collections import Counter, deque

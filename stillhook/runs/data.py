@@ -4,8 +4,6 @@ Numbers are in SI under the names of `models.run.summary`.  JSON has no NaN and 
 a quantity did not occur, or has no end, it is null.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any

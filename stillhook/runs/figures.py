@@ -3,8 +3,6 @@
 Each function returns a matplotlib `Figure`; nothing is shown, saved or kept.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -7,8 +7,6 @@ With several controllers each has a folder of its own, and the summary compares 
 is written whole or not at all.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -7,8 +7,6 @@ The runs differ in their seed alone: case, controller and scenario are the same.
 came of them.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence

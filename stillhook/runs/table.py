@@ -5,8 +5,6 @@
 All cells of a row are in the same unit, so that they can be compared.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

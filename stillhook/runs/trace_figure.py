@@ -4,8 +4,6 @@ One row for each thing that matters to an operator: hook and payload, drum, torq
 motor with their limits, the rope's tension, and when brake, telemetry and drive were not as usual.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass

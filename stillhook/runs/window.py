@@ -4,8 +4,6 @@ A run has more samples than a figure has dots.  The envelope keeps every peak of
 the window is where the payload is farthest from where it should be, or where it touches down.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Drawn as people of the trade draw them: one line for each limit with the region 
 shaded; the maker's lines of heave over period; roses and scatter diagrams.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Seas as figures and reports: the records of a file, their scatter diagram, one spectrum."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

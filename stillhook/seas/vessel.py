@@ -3,8 +3,6 @@
 RAOs are shown as amplitudes and phases, a hull by its panels from three sides.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

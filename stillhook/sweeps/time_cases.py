@@ -7,8 +7,6 @@ the case, its changes and its seed alone: so the numbers are the same to the las
 in whatever order it is done.
 """
 
-from __future__ import annotations
-
 import math
 import time as clock
 import warnings

@@ -3,8 +3,6 @@
 Run --> status_of, numbers_of --> one row of the result
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ controller keeps its model; command, motor torque and rope tension are told to i
 it, as deviations from a static state that is shifted to the true one.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import casadi as ca

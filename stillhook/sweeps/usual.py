@@ -6,8 +6,6 @@ The usual one is that of ``stillhook margins``, with a later telemetry: how far 
 the rope's stiffness, the drag and the link are off in practice.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

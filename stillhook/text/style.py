@@ -5,8 +5,6 @@ grey the hook, vermilion the payload with the drum held, blue the payload with t
 what the winch does, black the reference.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import logging

@@ -6,8 +6,6 @@ A study says what came of it as a `Report` and nothing else; the fourth form, th
 `stillhook.text.terminal`.  Figures are in SI units: a column says how they are written.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -14,8 +14,6 @@ An estimate, for feedback alone: a sensor that hears the sea before the payload 
 reference unit) is outside of it.  `synth.bound.bound` has the figure that counts.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

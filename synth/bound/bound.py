@@ -9,8 +9,6 @@ No controller that hears these sensors, with this noise, and keeps these rms lim
 of any order, with any margins or none.  It is the yardstick that goes with every design.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

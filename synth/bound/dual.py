@@ -17,8 +17,6 @@ Both Riccati equations need a plant whose disturbances are white and of intensit
 charged or limited an output as any other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -16,8 +16,6 @@ realizations", CDC 1984; by quadrature: Phillips and Silveira, IEEE Trans. CAD 2
 nothing is lost to squares of small numbers.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

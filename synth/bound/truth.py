@@ -22,8 +22,6 @@ misfit, and zero where the models are exact.  The bound is a theorem whatever th
 makes it low, never wrong.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

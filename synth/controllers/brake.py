@@ -1,7 +1,5 @@
 """The drum held by its brake: no controller, which every controller is compared with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import casadi as ca

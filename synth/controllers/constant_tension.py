@@ -24,8 +24,6 @@ linear plant with all its rope modes is stable with twice that gain too: a drum 
 phase with the tension damps every mode of the rope, but load cell and drum are late.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import casadi as ca

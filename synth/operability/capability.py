@@ -13,8 +13,6 @@ and the maker's sheet draws these lines.  Here they come from the same responses
 contours (`systems.PerfectSystem`), so friction and, of a DC motor, resistance are in them too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

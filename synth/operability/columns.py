@@ -3,8 +3,6 @@
 case, T_p, headings -> SeaColumn -> densities of all disturbances on nodes, at given H_s
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

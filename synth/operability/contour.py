@@ -1,7 +1,5 @@
 """Contour of one system: limiting H_s over peak period and heading, and what binds it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """State and contours of one length of rope paid out: `AtDepth`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

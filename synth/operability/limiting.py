@@ -9,8 +9,6 @@ Chandrupatla's method (1997), which never leaves its bracket.  No answer is inte
 solves for the drag anew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Operability question of a design or a case: its systems and criteria at one rope length."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

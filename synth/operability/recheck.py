@@ -6,8 +6,6 @@
 Nothing of this room is used: neither the update of low rank nor its nodes nor its root search.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

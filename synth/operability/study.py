@@ -12,8 +12,6 @@ The largest sea is the programme of `synth.design.infeasible`, with the payload'
 limits; the gains that it ends with are then looked at like those of any design.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

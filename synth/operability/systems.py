@@ -8,8 +8,6 @@ nodes with the drag as a variable (`responses.DragResponses`), and with which dr
     case         -> PerfectSystem   what any winch must do to hold the upper end still
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -13,8 +13,6 @@ here as the mean of the highest tenth of the waves, H_1/10 = 1.27 H_s in a Rayle
 (Longuet-Higgins, J. Marine Res. 11, 1952): another reading moves all its figures by one factor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -16,8 +16,6 @@ optimal?", IEEE TAC 42, 1997; Bhattacharyya, Chapellat and Keel, *Robust Control
 Parametric Approach*, 1995, ch. 4).  Delays are exact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -8,8 +8,6 @@ no more than those in the set (Apkarian, Dao and Noll, "Parametric robust struct
 design", IEEE TAC 60, 2015); it is returned with the gains, as it says what decides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Result of a robust design, with the checks and the verdict on it: `RobustDesign`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

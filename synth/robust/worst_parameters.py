@@ -11,8 +11,6 @@ closed by the engine of sweeps.  Errors of the gains alone have a radius that is
 beside.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ loop itself is differentiated automatically (`slopes`).  Integrals over the sea 
 table has them; there the two sides have slopes of their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

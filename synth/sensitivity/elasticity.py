@@ -19,8 +19,6 @@ is the preset `Sensitivity.moved`: its gains 10 % up, one at a time, the respons
 full.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

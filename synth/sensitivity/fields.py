@@ -7,8 +7,6 @@ physical world, and neither are counts and choices.  Columns of a table (the hea
 one number: a factor on the whole column.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ unstable is left out with all its crossings, counted, and never averaged in; the
 those of the stable part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 `elasticity.sensitivity` computes them; figures and commands show them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

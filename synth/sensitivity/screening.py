@@ -9,8 +9,6 @@ al., Environ. Model. Softw. 22, 2007).  It costs r (d + 1) cases, far fewer than
 An effect with an unstable end is left out and counted.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

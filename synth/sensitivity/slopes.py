@@ -13,8 +13,6 @@ following sea), and its integral has none.  So the integral is differentiated, e
 of its own that begin new panels at the kinks, with the loop and its drag as they are.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -13,8 +13,6 @@ resistance and currents with the torque, the gain of the drive's speed regulator
 the power of an AC motor goes with its torque and base speed.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Mapping, Sequence

@@ -13,8 +13,6 @@ cube.  Nearly everything hangs on n/r alone, so the pair is searched in n/r and 
 hardly depend on each other; a drum that gains nothing stays as it is.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -8,8 +8,6 @@ may change basins: it is walked from both ends, from its middle and from every b
 searches there found, and the best answer at each bound counts (`synth.sizing.pareto_walk`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

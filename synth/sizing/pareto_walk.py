@@ -8,8 +8,6 @@ multi-start searches, go both ways and end where another walk has been with a be
 may change basins.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 

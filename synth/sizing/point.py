@@ -9,8 +9,6 @@ the factor on the ratings of a motor of scale s.  Where f stays above one, falli
 with the motor, it is the motor's own inertia that stops it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

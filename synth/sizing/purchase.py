@@ -9,8 +9,6 @@ optimum and from fresh starts, since the best may lie elsewhere then: what still
 what the list is sorted by.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

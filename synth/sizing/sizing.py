@@ -10,8 +10,6 @@ the smallest power too.  The other way round the sizing says what the case's own
 still it holds the payload in that sea, and in how high a sea it still meets the target.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

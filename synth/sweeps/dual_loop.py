@@ -5,8 +5,6 @@ slopes by any variables; the logarithms of standard deviations and of peaks of |
 theirs, exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

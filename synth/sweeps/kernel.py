@@ -15,8 +15,6 @@ cache.  All variances then are its products with a few powers of the frequency, 
 \|numerator\|^2 is a polynomial in omega^2: one matrix product for all outputs together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

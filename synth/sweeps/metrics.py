@@ -1,7 +1,5 @@
 """Metrics of a sweep: names, units, and the outputs of the plant that they need."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ compared with the checked cases of some of the rows.  Where a formula asks which
 columns refuse to answer, or there is any difference, every row goes through its own checked case.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields

@@ -6,8 +6,6 @@ holds for the case at hand is tried on some rows; where it does not, every diffe
 through its own case.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from models.basics import FloatArray

@@ -20,8 +20,6 @@ the loop is open, which is stable.  All but a slow drift: where closed(0) is not
 pole is in the right half plane whatever the drag.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

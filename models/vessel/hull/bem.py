@@ -16,8 +16,6 @@ file that is damaged or of another make is computed again, and one that cannot b
 without.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -5,8 +5,6 @@ Capytaine's readers.  What is above the waterline is cut off, and a lid that the
 is left out.  The waterline is the file's z = 0, unless the draught is given.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import warnings

@@ -11,8 +11,6 @@ or whose panels look inwards, gives forces that no later step would notice to be
 Frame: x forward, y to port, z up, z = 0 at the still waterline.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Callable, Mapping

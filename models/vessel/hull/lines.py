@@ -17,8 +17,6 @@ and the ship is still too full, their waterlines get straighter.  They are found
 themselves, so that the displacement is what was asked whatever the number of panels.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, dataclass
 

@@ -8,8 +8,6 @@ motions are tabulated wherever they bend, above all around the resonance of roll
 lines between the rows are as good as the table.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ stand in any order, with or without the name of their body; water depth, density
 axes or single numbers.  Here all that is settled, and nothing is computed yet.
 """
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Mapping, Sequence

@@ -10,8 +10,6 @@ complex conjugate of everything is all that it takes to get to the project's con
 Capytaine nor its packages are needed.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

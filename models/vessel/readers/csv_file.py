@@ -17,8 +17,6 @@ the second `heading` [deg]; a motion is `_amplitude` and `_phase` [deg], or `_re
 Motions without columns are zero; heave must be there.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -8,8 +8,6 @@ is still one.  Whatever a reader trips over comes out as an
 and is caught here, once for all of them.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -15,8 +15,6 @@ that begins at waves that are not long need not keep the limits (Orcina, *Checki
 the same care).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

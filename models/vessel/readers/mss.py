@@ -9,8 +9,6 @@ Hydrodynamics and Motion Control*, 2nd ed., 2021, and `HYDRO/utils/readdata` of 
 Unused speeds are columns of zeros: MSS keeps room for ten.
 """
 
-from __future__ import annotations
-
 import io
 from typing import Any
 

@@ -12,8 +12,6 @@ in deep water, as OrcaFlex itself does.
 Older versions write `RAOPeriodOrFreq` where newer ones write `RAOPeriodOrFrequency`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

@@ -10,8 +10,6 @@ y to starboard, z up; time factor e^{+i omega t}; heading 0 is head sea.  That i
 frame turned by half a circle about z, and so are the headings.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -14,8 +14,6 @@ number.  WAMIT Inc., user manual 7.4, sections 3.4 and 4.9:
 Each line says everything twice, which tells a file that was cut, shuffled or edited.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

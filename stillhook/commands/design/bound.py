@@ -1,7 +1,5 @@
 """`stillhook bound`: the best that any linear controller of a case could do with its sensors."""
 
-from __future__ import annotations
-
 import argparse
 
 from ...text import Report, ReportSection

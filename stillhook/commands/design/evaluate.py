@@ -1,7 +1,5 @@
 """`stillhook evaluate`: what gains do that somebody else has chosen."""
 
-from __future__ import annotations
-
 import argparse
 
 from ..declare import CASE, NAMED_DESIGN, NO_BOUND, options

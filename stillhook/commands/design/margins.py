@@ -1,7 +1,5 @@
 """`stillhook margins`: how far the plant's numbers may be off before a design is unstable."""
 
-from __future__ import annotations
-
 import argparse
 
 from models.spread import GAINS

@@ -1,7 +1,5 @@
 """`stillhook pareto`: how still the payload can be held against what it costs."""
 
-from __future__ import annotations
-
 import argparse
 
 from ..declare import CASE, options

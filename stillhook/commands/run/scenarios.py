@@ -1,7 +1,5 @@
 """`stillhook scenarios`: the operations and the controllers that can be simulated."""
 
-from __future__ import annotations
-
 import argparse
 
 from models.basics import KINDS

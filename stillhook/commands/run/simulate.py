@@ -4,8 +4,6 @@ Exit status 0 if every run went to its end, 1 if one diverged, 130 after Ctrl-C;
 until then is written all the same.
 """
 
-from __future__ import annotations
-
 import argparse
 import shlex
 import sys

@@ -4,8 +4,6 @@ Exit status 0 if every run was made, 1 if one failed or nobody could take part, 
 what was simulated until then is kept, and the same command goes on with it.
 """
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from pathlib import Path

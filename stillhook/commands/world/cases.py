@@ -1,7 +1,5 @@
 """`stillhook cases`: the bundled cases."""
 
-from __future__ import annotations
-
 import argparse
 
 from ...text import Report, ReportSection, pairs

@@ -4,8 +4,6 @@ A first look at a lift, before any controller: how fast a winch would have to be
 and side ask least of it.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import shlex

@@ -1,7 +1,5 @@
 """`stillhook new`: a commented case file that runs as it is."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`stillhook schema`: the JSON Schema of a case file, for editors."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

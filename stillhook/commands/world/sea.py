@@ -4,8 +4,6 @@ Of a file: what was read and what was rejected and why, its statistics, its scat
 of its spectra, and how a case takes it.  Of a case: its spectrum.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import shlex

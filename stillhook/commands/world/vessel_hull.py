@@ -1,7 +1,5 @@
 """`stillhook vessel hull`: a vessel's motions from its main dimensions, or from a mesh."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

@@ -1,7 +1,5 @@
 """`stillhook vessel import`: read a RAO file, say what it is and if it can be true, keep it."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`stillhook vessel list`: the vessels that come with the toolkit."""
 
-from __future__ import annotations
-
 import argparse
 
 from ...text import Report, ReportSection, pairs
