@@ -2,7 +2,7 @@ r"""Stability margins read off a traced Nyquist curve, root by root.
 
 The second opinion to `synth.loop.margins`: the curve is followed with points as close as its phase
 asks for (`synth.verify.winding.trace`), and every crossing and every peak between them is then
-solved for on its own, by Brent's methods.
+closed in on, by cutting what holds it into even pieces again and again.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from functools import reduce
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq, minimize_scalar
 
 from models.basics import ComplexArray, FloatArray, SolverError
 
@@ -21,6 +20,8 @@ from .winding import Function, axis_clusters, lively, trace
 
 _FLOOR = 5e-5  # |L| below which the curve's phase is not followed, for no check asks for 1e-4
 _VALLEYS = 6  # local extrema that are solved for, the most extreme first
+_PIECES = np.linspace(0.0, 1.0, 33)  # that an interval is cut into ...
+_CUTS = 5  # ... so many times, before the last straight line
 _SEEN = 0.5  # |log|L|| at an extremum that might still hide a crossing
 
 
@@ -78,19 +79,16 @@ class Curve:
     @property
     def margins(self) -> CurveMargins:
         """All margins of the loop."""
-        crossings = [self._root(self._log_gain, i) for i in self._changes(np.log(self._sizes))]
-        turns = [float(np.angle(1.0 - self._at(t))) for t in crossings]  # beyond -180 deg
-        delays = [
-            turn % (2.0 * np.pi) / float(np.exp(t))
-            for turn, t in zip(turns, crossings, strict=True)
-        ]
+        crossings = self._roots(_log_gain, self._changes(np.log(self._sizes)))
+        turns = np.angle(1.0 - self._at(crossings))  # beyond -180 deg
+        delays = turns % (2.0 * np.pi) / np.exp(crossings)
         real = self._real_crossings()
         return CurveMargins(
             max_sensitivity=1.0 / self._least(np.abs),
             gain=min((-1.0 / x for x in real if -1.0 < x < 0.0), default=np.inf),
             gain_down=max((-1.0 / x for x in real if x < -1.0), default=0.0),
-            phase=min((abs(turn) for turn in turns), default=np.inf),
-            delay=min(delays, default=np.inf),
+            phase=float(np.abs(turns).min(initial=np.inf)),
+            delay=float(delays.min(initial=np.inf)),
             # 1/max|S - 1/2|, S = 1/(1 + L)
             disk=self._least(lambda d: 2.0 * np.abs(d) / np.maximum(np.abs(2.0 - d), 1e-300)),
         )
@@ -99,19 +97,30 @@ class Curve:
     def _sizes(self) -> FloatArray:
         return np.maximum(np.abs(self.values - 1.0), 1e-300)
 
-    def _at(self, t: float) -> complex:
-        return complex(self._difference(np.array([1j * np.exp(t)]))[0])
+    def _at(self, t: FloatArray) -> ComplexArray:
+        """Return 1 + L at logarithms of frequencies, of any shape."""
+        found = self._difference(np.asarray(1j * np.exp(t.ravel()), dtype=np.complex128))
+        return np.asarray(found.reshape(t.shape))
 
-    def _log_gain(self, t: float) -> float:
-        return float(np.log(max(abs(self._at(t) - 1.0), 1e-300)))
-
-    def _root(self, function: Callable[[float], float], index: int) -> float:
-        """Return the root between point `index` and the next."""
-        low, high = float(self.t[index]), float(self.t[index + 1])
-        first, last = function(low), function(high)
-        if (first < 0.0) == (last < 0.0):
-            return low  # the sign hangs on rounding: the point itself is the root
-        return float(brentq(function, low, high, xtol=1e-13, rtol=1e-13))
+    def _roots(
+        self, function: Callable[[ComplexArray], FloatArray], index: npt.NDArray[np.intp]
+    ) -> FloatArray:
+        """Return the roots of a function of 1 + L between points `index` and the next."""
+        low, high = self.t[index], self.t[index + 1]
+        rows = np.arange(index.size)
+        for _ in range(_CUTS if index.size else 0):
+            t = low[:, None] + (high - low)[:, None] * _PIECES
+            values = function(self._at(t))
+            changed = (values[:, 1:] < 0.0) != (values[:, :-1] < 0.0)
+            # Where the sign hangs on rounding the first piece is as good as any.
+            k = np.argmax(changed, axis=1)
+            low, high = t[rows, k], t[rows, k + 1]
+            ends = values[rows, k], values[rows, k + 1]
+        if not index.size:
+            return low
+        rise = ends[1] - ends[0]
+        share = np.where(rise == 0.0, 0.0, -ends[0] / np.where(rise == 0.0, 1.0, rise))
+        return np.asarray(low + np.clip(share, 0.0, 1.0) * (high - low))
 
     @staticmethod
     def _changes(values: FloatArray) -> npt.NDArray[np.intp]:
@@ -119,12 +128,8 @@ class Curve:
 
     def _least(self, measure: Callable[[ComplexArray], FloatArray]) -> float:
         """Return the least value of a measure of 1 + L along the curve."""
-        return _least(
-            lambda t: float(measure(np.array([self._at(t)]))[0]),
-            self.t,
-            np.asarray(measure(self.values), dtype=np.float64),
-            1.5,
-        )
+        values = np.asarray(measure(self.values), dtype=np.float64)
+        return _least(lambda t: measure(self._at(t)), self.t, values, 1.5)
 
     def _real_crossings(self) -> list[float]:
         """Return the values of L where it meets the real axis, its ends there included."""
@@ -133,8 +138,8 @@ class Curve:
         change = change[np.maximum(np.abs(loop[change]), np.abs(loop[change + 1])) > _FLOOR]
         # The curve turns by little between points: right of zero at both, right of it between.
         change = change[np.minimum(loop[change].real, loop[change + 1].real) < 0.0]
-        roots = [self._root(lambda t: self._at(t).imag, int(i)) for i in change]
-        found = [self._at(t).real - 1.0 for t in roots]
+        roots = self._roots(lambda d: np.asarray(d.imag), change)
+        found = (self._at(roots).real - 1.0).tolist()
         # A finite gain at rest begins on the axis, a direct path ends there.
         return found + [float(end.real) for end in loop[[0, -1]] if abs(end.imag) < 1e-3 * abs(end)]
 
@@ -145,22 +150,22 @@ class Curve:
         near = np.abs(inner) < _SEEN
         tops = near & (inner < 0.0) & (inner >= left) & (inner >= right)
         dips = near & (inner > 0.0) & (inner <= left) & (inner <= right)
-        added = []
-        for i in np.flatnonzero(tops | dips) + 1:
-            sign = np.sign(level[i])
-            found = minimize_scalar(
-                lambda t, sign=sign: float(sign * self._log_gain(t)),
-                bounds=(self.t[i - 1], self.t[i + 1]),
-                method="bounded",
-                options={"xatol": 1e-8},
-            )
-            if found.fun < 0.0:
-                added.append(float(found.x))
-        if added:
-            t = np.concatenate([self.t, added])
-            values = np.concatenate([self.values, [self._at(x) for x in added]])
-            order = np.argsort(t)
-            self.t, self.values = t[order], values[order]
+        at = np.flatnonzero(tops | dips) + 1
+        if not at.size:
+            return
+        sign = np.sign(level[at])[:, None]
+        added, found = _valleys(
+            lambda t: sign * _log_gain(self._at(t)), self.t[at - 1], self.t[at + 1]
+        )
+        added = added[found < 0.0]
+        t = np.concatenate([self.t, added])
+        values = np.concatenate([self.values, self._at(added)])
+        order = np.argsort(t)
+        self.t, self.values = t[order], values[order]
+
+
+def _log_gain(difference: ComplexArray) -> FloatArray:
+    return np.asarray(np.log(np.maximum(np.abs(difference - 1.0), 1e-300)))
 
 
 def curve_margins(difference: Function, marks: ComplexArray) -> CurveMargins:
@@ -193,23 +198,37 @@ def largest(
     """Return the largest value of a real function of omega between `low` and `high` [rad/s]."""
     t = np.log(lively(low, high, marks, per_decade=100))
     return -_least(
-        lambda x: -float(function(np.array([np.exp(x)]))[0]), t, -function(np.exp(t)), 0.7
+        lambda x: -function(np.exp(x.ravel())).reshape(x.shape), t, -function(np.exp(t)), 0.7
     )
 
 
 def _least(
-    function: Callable[[float], float], t: FloatArray, values: FloatArray, share: float
+    function: Callable[[FloatArray], FloatArray], t: FloatArray, values: FloatArray, share: float
 ) -> float:
     """Return the least value of a function, known on points, from its valleys.
 
-    Those are solved for whose floor is at most `share` of the lowest.
+    Those are gone into whose floor is at most `share` of the lowest.
     """
     best = float(values.min())
     valley = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
     valley = valley[values[valley] < share * best]
-    for i in valley[np.argsort(values[valley])][:_VALLEYS]:
-        found = minimize_scalar(
-            function, bounds=(t[i - 1], t[i + 1]), method="bounded", options={"xatol": 1e-10}
-        )
-        best = min(best, float(found.fun))
-    return best
+    valley = valley[np.argsort(values[valley])][:_VALLEYS]
+    found = _valleys(function, t[valley - 1], t[valley + 1])[1]
+    return float(found.min(initial=best))
+
+
+def _valleys(
+    function: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return where functions are least between two points each, and how small, (v,) each.
+
+    The function takes a row of points for each, (v, n).
+    """
+    rows, place, least = np.arange(low.size), low, np.full(low.size, np.inf)
+    for _ in range(_CUTS if low.size else 0):
+        t = low[:, None] + (high - low)[:, None] * _PIECES
+        values = function(t)
+        k = np.argmin(values, axis=1)
+        place, least = t[rows, k], values[rows, k]
+        low, high = t[rows, np.maximum(k - 1, 0)], t[rows, np.minimum(k + 1, _PIECES.size - 1)]
+    return place, least
