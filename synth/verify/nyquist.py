@@ -139,7 +139,7 @@ class Curve:
         # The curve turns by little between points: right of zero at both, right of it between.
         change = change[np.minimum(loop[change].real, loop[change + 1].real) < 0.0]
         roots = self._roots(lambda d: np.asarray(d.imag), change)
-        found = (self._at(roots).real - 1.0).tolist()
+        found = [float(value) for value in self._at(roots).real - 1.0]
         # A finite gain at rest begins on the axis, a direct path ends there.
         return found + [float(end.real) for end in loop[[0, -1]] if abs(end.imag) < 1e-3 * abs(end)]
 

@@ -16,7 +16,7 @@ from models.plant import LinearPlant, PlantResponse
 from .claims import ControllerMatrices, LoopClaims, SpectralSource
 from .demands import Demand
 from .nyquist import CurveMargins, curve_margins
-from .recompute import LawMatrices, Loop, closed_matrices, correlation, moments
+from .recompute import LawMatrices, Loop, closed_matrices, moments, signed_moments
 from .verification import Check, Verification, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
 
@@ -145,15 +145,18 @@ class CheckedLoop(Loop):
         Outputs whose variances are wanted besides.
     still
         The loop without losses that switch, whose margins count too; None where it has none.
-    members
-        The same with each combination of signs of the reference unit's errors, where it has some.
+    signs
+        What the reference unit shows with each combination of signs of its errors, if it has some.
+    rest
+        What shakes the loop beside those errors.
     """
 
     sources: Sequence[SpectralSource]
     demands: Mapping[str, Demand]
     own: Iterable[str]
     still: CheckedLoop | None = None
-    members: Sequence[CheckedLoop] = ()
+    signs: Sequence[complex] = ()
+    rest: Sequence[SpectralSource] = ()
 
     @classmethod
     def of(
@@ -163,7 +166,7 @@ class CheckedLoop(Loop):
         sources: Sequence[SpectralSource],
         demands: Mapping[str, Demand],
         own: Iterable[str],
-        exact: Callable[[ComplexArray], PlantResponse] | None = None,
+        exact: Callable[[ComplexArray, Sequence[str]], PlantResponse] | None = None,
     ) -> CheckedLoop:
         """Return the loop of a controller around a plant."""
         law = LawMatrices.of(controller, plant)
@@ -203,7 +206,9 @@ class CheckedLoop(Loop):
         Integrals to infinity may be infinite, each on its own.
         """
         orders: dict[str, tuple[int, ...]] = dict.fromkeys(self.own, (0,))
-        for demand in self.demands.values():
+        # With signs of errors the demands are about `signed`.
+        demands = [] if self.signs else [*self.demands.values()]
+        for demand in demands:
             for name, own in demand.orders.items():
                 orders[name] = max(orders.get(name, ()), own, key=len)
         found: dict[str, tuple[float, ...]] = {}
@@ -212,16 +217,22 @@ class CheckedLoop(Loop):
                 n: tuple(self._endless(n, order) for order in own) for n, own in orders.items()
             }
             # Where it cannot be told they are taken as going together, the worst they can do.
-            return found | {d.together: (1.0,) for d in self.demands.values() if d.together}
+            return found | {d.together: (1.0,) for d in demands if d.together}
+        pairs = _pairs(demands)
         for wanted in sorted(set(orders.values())):
             names = sorted(name for name, own in orders.items() if own == wanted)
-            found |= moments(self, names, self.sources, orders=wanted)
-        for demand in self.demands.values():
-            if demand.together:
-                sizes = [math.sqrt(found[name][0]) for name in demand.outputs]
-                rho = correlation(self, demand.outputs, sizes, self.sources)
-                found[demand.together] = (rho,)
+            mixed = {key: pair for key, pair in pairs.items() if {*pair} <= {*names}}
+            found |= moments(self, names, self.sources, orders=wanted, pairs=mixed)
+        for key in pairs.keys() - found.keys():
+            found |= moments(self, pairs[key], self.sources, orders=(0,), pairs={key: pairs[key]})
         return found
+
+    @cached_property
+    def signed(self) -> list[dict[str, tuple[float, ...]]]:
+        """Moments of what is demanded with each combination of signs of the unit's errors."""
+        asked = [demand for demand in self.demands.values() if demand.orders]
+        names = sorted({name for demand in asked for name in demand.outputs})
+        return signed_moments(self, names, self.rest, self.signs, pairs=_pairs(asked))
 
     def _endless(self, output: str, order: int) -> float:
         delay = max(self.plant.delays, default=0.0)
@@ -236,8 +247,8 @@ class CheckedLoop(Loop):
 
     def measured(self, demand: Demand) -> float:
         """Return what the loop makes of a demand, with the worst signs of the unit's errors."""
-        each = self.members if demand.orders and self.members else (self,)
-        found = [demand.measured(one, self.margins, self.region, one.moments) for one in each]
+        each = self.signed if demand.orders and self.signs else [self.moments]
+        found = [demand.measured(self, self.margins, self.region, one) for one in each]
         if self.still is not None and not demand.orders:
             still = self.still
             found.append(demand.measured(still, self.margins, still.region, self.moments))
@@ -288,6 +299,11 @@ class CheckedLoop(Loop):
         for name in sorted(set(claims) - set(self.demands)):
             checks.append(failure(f"limits.{name}", f"the {by} has no such limit"))
         return checks
+
+
+def _pairs(demands: Sequence[Demand]) -> dict[str, Sequence[str]]:
+    """Return the outputs whose correlation demands ask for, by its name."""
+    return {demand.together: demand.outputs for demand in demands if demand.together}
 
 
 def inverse_agreement(name: str, claimed: float, found: float) -> Check:

@@ -11,6 +11,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -74,32 +76,38 @@ class Loop:
     marks
         Poles [1/s] near which something happens: of the open and of the closed loop.
     exact
-        Points s -> the plant's blocks, where they are not those of `plant` (a distributed rope).
-    shown
-        What the reference unit shows of the hook's motion over what it should, its gain and phase
-        error [-].
+        Points s and names of disturbances -> the plant's blocks, where they are not those of
+        `plant` (a distributed rope).
     """
 
     plant: LinearPlant
     law: LawMatrices
     marks: ComplexArray
-    exact: Callable[[ComplexArray], PlantResponse] | None = None
-    shown: complex = 1.0
-    _known: dict[bytes, tuple[PlantResponse, ComplexArray]] = field(default_factory=dict)
+    exact: Callable[[ComplexArray, Sequence[str]], PlantResponse] | None = None
+    _known: dict[Any, tuple[PlantResponse, ComplexArray]] = field(default_factory=dict)
+    _parts: dict[Any, LinearPlant] = field(default_factory=dict)
 
-    def blocks(self, s: ComplexArray) -> PlantResponse:
-        """Return the plant's four blocks at points s [1/s]."""
-        return self.plant.response_at(s) if self.exact is None else self.exact(s)
+    def blocks(
+        self, s: ComplexArray, outputs: Sequence[str] = (), disturbances: Sequence[str] = ()
+    ) -> PlantResponse:
+        """Return the plant's four blocks at points s [1/s], of as many signals as are wanted."""
+        if self.exact is not None:
+            return self.exact(s, disturbances).select(outputs=outputs, disturbances=disturbances)
+        key = tuple(outputs), tuple(disturbances)
+        if key not in self._parts:
+            self._parts[key] = self.plant.select(outputs=outputs, disturbances=disturbances)
+        return self._parts[key].response_at(s)
 
     def difference(self, s: ComplexArray) -> ComplexArray:
         """Return det(I - C P_yu), (k,)."""
-        return np.asarray(np.linalg.det(self._matrix(s, self.blocks(s))), dtype=np.complex128)
+        matrix = self._matrix(self.law(s), self.blocks(s))
+        return np.asarray(np.linalg.det(matrix), dtype=np.complex128)
 
     def broken(self, index: int) -> Function:
         """Return 1 + L of loop `index`, all others closed, as a function of s."""
 
         def difference(s: ComplexArray) -> ComplexArray:
-            matrix = self._matrix(s, self.blocks(s))
+            matrix = self._matrix(self.law(s), self.blocks(s))
             if matrix.shape[1] == 1:
                 return matrix[:, 0, 0]
             return np.asarray(1.0 / np.linalg.inv(matrix)[:, index, index])
@@ -110,31 +118,40 @@ class Loop:
         self, s: ComplexArray, outputs: Sequence[str], disturbances: Sequence[str]
     ) -> ComplexArray:
         """Return the closed-loop responses, (k, outputs, disturbances)."""
-        whole, inner = self._closed(s)
-        blocks = whole.select(outputs=outputs, disturbances=disturbances)
-        seen = np.array(blocks.yw)
-        if self.shown != 1.0:
-            unit = [k for k, y in enumerate(blocks.measurements) if y.startswith("mru.")]
-            hook = [k for k, w in enumerate(blocks.disturbances) if w == HOOK]
-            seen[np.ix_(range(len(s)), unit, hook)] *= self.shown
-        return np.asarray(blocks.zw + blocks.zu @ (inner @ seen), dtype=np.complex128)
+        return self.transfers(s, outputs, disturbances, (1.0,))[0]
 
-    def _closed(self, s: ComplexArray) -> tuple[PlantResponse, ComplexArray]:
-        """Return the plant's blocks and (I - C P_yu)^-1 C, (k, nu, ny).
+    def transfers(
+        self,
+        s: ComplexArray,
+        outputs: Sequence[str],
+        disturbances: Sequence[str],
+        shown: Sequence[complex],
+    ) -> list[ComplexArray]:
+        """Return `transfer` by what the reference unit shows of the hook's motion.
 
-        They are kept: other outputs, and other signs of the unit's errors, ask for the same points.
+        That is over what it should show, with its gain and phase error [-].
         """
-        key = s.tobytes()
+        key = s.tobytes(), tuple(outputs), tuple(disturbances)
         if key not in self._known:
-            blocks = self.blocks(s)
+            blocks, law = self.blocks(s, outputs, disturbances), self.law(s)
             if len(self._known) >= _KEPT:
                 self._known.clear()
-            inner = np.linalg.solve(self._matrix(s, blocks), self.law(s)).astype(np.complex128)
-            self._known[key] = blocks, inner
-        return self._known[key]
+            inner = np.linalg.solve(self._matrix(law, blocks), law)
+            self._known[key] = blocks, np.asarray(blocks.zu @ inner, dtype=np.complex128)
+        blocks, through = self._known[key]
+        unit = [k for k, y in enumerate(blocks.measurements) if y.startswith("mru.")]
+        found = []
+        for one in shown:
+            seen = blocks.yw
+            if one != 1.0 and HOOK in disturbances:
+                seen = np.array(seen)
+                seen[:, unit, list(disturbances).index(HOOK)] *= one
+            found.append(np.asarray(blocks.zw + through @ seen, dtype=np.complex128))
+        return found
 
-    def _matrix(self, s: ComplexArray, blocks: PlantResponse) -> ComplexArray:
-        through = self.law(s) @ blocks.yu
+    @staticmethod
+    def _matrix(law: ComplexArray, blocks: PlantResponse) -> ComplexArray:
+        through = law @ blocks.yu
         return np.asarray(np.eye(through.shape[1]) - through, dtype=np.complex128)
 
 
@@ -148,34 +165,13 @@ class Source:
     splits: tuple[float, ...] = ()
 
 
-def correlation(
-    loop: Loop,
-    pair: Sequence[str],
-    sizes: Sequence[float],
-    sources: Sequence[SpectralSource],
-    *,
-    delay: float = 0.0,
-) -> float:
-    """Return the correlation of two closed-loop outputs, from the variance of their sum.
-
-    Parameters
-    ----------
-    loop, sources, delay
-        As `moments` takes them.
-    pair, sizes
-        The outputs, and their standard deviations, by which they are divided first.
-    """
-    mixed = np.array([[1.0 / size for size in sizes]])
-    both = _integrals(loop, pair, sources, mixed, orders=(0,), rtol=1e-8, delay=delay)
-    return float(np.clip(0.5 * both[0, 0] - 1.0, -1.0, 1.0))
-
-
 def moments(
     loop: Loop,
     outputs: Sequence[str],
     sources: Sequence[SpectralSource],
     *,
     orders: Sequence[int] = (0, 2),
+    pairs: Mapping[str, Sequence[str]] | None = None,
     rtol: float = 1e-8,
     delay: float = 0.0,
 ) -> dict[str, tuple[float, ...]]:
@@ -193,7 +189,9 @@ def moments(
     sources
         What shakes it; one without a band makes the integral run over the half line.
     orders
-        The moments' orders.
+        The moments' orders, 0 the first.
+    pairs
+        Outputs whose correlation is wanted, two by its name, from the variance of their sum.
     rtol
         Relative accuracy.
     delay
@@ -204,22 +202,22 @@ def moments(
     SolverError
         If it does not converge: the integral does not exist, or a spectrum is wild.
     """
-    plain = np.eye(len(outputs))
-    rows = _integrals(loop, outputs, sources, plain, orders=orders, rtol=rtol, delay=delay)
-    return {name: tuple(float(v) for v in row) for name, row in zip(outputs, rows, strict=True)}
+    how = partial(signed_moments, orders=orders, rtol=rtol, delay=delay)
+    return how(loop, outputs, sources, (1.0,), pairs=pairs or {})[0]
 
 
-def _integrals(
+def signed_moments(
     loop: Loop,
     outputs: Sequence[str],
     sources: Sequence[SpectralSource],
-    mixed: FloatArray,
+    shown: Sequence[complex],
     *,
-    orders: Sequence[int],
-    rtol: float,
-    delay: float,
-) -> FloatArray:
-    """Return the moments of sums of outputs with the weights `mixed`, (sums, outputs)."""
+    pairs: Mapping[str, Sequence[str]],
+    orders: Sequence[int] = (0, 2),
+    rtol: float = 1e-8,
+    delay: float = 0.0,
+) -> list[dict[str, tuple[float, ...]]]:
+    """Return `moments` by what the reference unit shows, see `Loop.transfers`."""
     names = [source.name for source in sources]
     powers = np.asarray(orders, dtype=np.float64)[:, None]
     low, high, splits, half_line = _band(sources, loop.marks)
@@ -228,16 +226,33 @@ def _integrals(
         longest, tail = 4.0 * np.pi / delay, _RINGING_TAIL
         high = max(high, _RUNG_OUT / delay)
     edges = panels(low, high, splits, loop.marks, longest)
+    couples = [[outputs.index(name) for name in pair] for pair in pairs.values()]
+    mixed = np.eye(len(outputs))
 
     def density(omega: FloatArray) -> FloatArray:
-        """Return omega^n S of every output, (outputs * orders, k)."""
-        gains = np.abs(mixed @ loop.transfer(imaginary(omega), outputs, names)) ** 2
+        """Return omega^n S of every sum of outputs, (shown * sums * orders, k)."""
         shaken = np.stack([source.density(omega) for source in sources])
-        spectra = np.einsum("kzw,wk->zk", gains, shaken)
-        return np.asarray((spectra[:, None] * omega**powers).reshape(-1, omega.size))
+        each = loop.transfers(imaginary(omega), outputs, names, shown)
+        spectra = [np.einsum("kzw,wk->zk", np.abs(mixed @ one) ** 2, shaken) for one in each]
+        return np.asarray((np.stack(spectra)[:, :, None] * omega**powers).reshape(-1, omega.size))
 
+    if couples:
+        # Of outputs of about the same size, whatever their units.
+        rough = density(edges).reshape(len(shown), len(outputs), len(orders), -1)[0, :, 0]
+        size = np.sqrt(np.trapezoid(rough, edges))
+        weights = np.array([[i in couple for i in range(len(outputs))] for couple in couples])
+        mixed = np.vstack([mixed, weights / np.where(size > 0.0, size, 1.0)])
     found = integrate(density, edges, rtol=rtol, tail_panels=tail if half_line else 0)
-    return found.reshape(len(mixed), -1)
+    rows = found.reshape(len(shown), len(mixed), len(orders))
+    every = []
+    for own in rows.tolist():
+        one = {name: tuple(row) for name, row in zip(outputs, own, strict=False)}
+        for k, (name, couple) in enumerate(zip(pairs, couples, strict=True), len(outputs)):
+            parts = mixed[k, couple] * np.sqrt([own[i][0] for i in couple])
+            rho = (own[k][0] - parts @ parts) / (2.0 * parts.prod()) if parts.all() else 0.0
+            one[name] = (float(np.clip(rho, -1.0, 1.0)),)
+        every.append(one)
+    return every
 
 
 def closed_matrices(

@@ -13,7 +13,7 @@ the question, the search or the design is used.  `verify_tuning` does the same f
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -159,8 +159,7 @@ class _Winch:
             for gain in (1.0, -1.0)
             for phase in (1.0, -1.0)
         ]
-        members = [replace(loop, sources=sources, own=(), shown=one) for one in shown]
-        return replace(loop, members=members)
+        return replace(loop, rest=sources, signs=shown)
 
     @property
     def more_masses(self) -> int:
@@ -190,11 +189,16 @@ class _Winch:
         plant = sensed_plant(self.design.case, masses=masses, drag=drag, friction=friction)
         return plant.select(measurements=self.design.controller.measurements)
 
-    def _line(self, friction: float, s: ComplexArray) -> PlantResponse:
-        line = sensed_line_at(
-            self.design.case, s, drag=self.design.drag, friction=friction, data=self.data
+    def _line(self, friction: float, s: ComplexArray, disturbances: Sequence[str]) -> PlantResponse:
+        return sensed_line_at(
+            self.design.case,
+            s,
+            drag=self.design.drag,
+            friction=friction,
+            data=self.data,
+            measurements=self.design.controller.measurements,
+            disturbances=disturbances,
         )
-        return line.select(measurements=self.design.controller.measurements)
 
     @cached_property
     def coarse_plant(self) -> LinearPlant:

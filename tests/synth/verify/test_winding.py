@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -162,8 +160,12 @@ def test_the_distributed_rope_is_counted_as_its_masses_are() -> None:
         gains = scale * np.array([[10000.0, 20000.0, 20000.0]])
         law = LawMatrices(A=np.zeros((0, 0)), B=np.zeros((0, 3)), C=np.zeros((1, 0)), D=-gains)
         marks = closed_loop_marks(plant, law)
-        line = partial(line_response, data, drag=5000.0)
-        rope = Loop(plant=plant, exact=line, law=law, marks=marks)
+        rope = Loop(
+            plant=plant,
+            exact=lambda s, names: line_response(data, s, drag=5000.0, disturbances=names),
+            law=law,
+            marks=marks,
+        )
         found = count_unstable(rope.difference, poles=[0.0], marks=marks)
         closed = np.linalg.eigvals(closed_matrices(plant, law)[0])
         assert found.unstable == int(np.sum(closed.real > 0.0))
