@@ -260,59 +260,67 @@ class LoopResponses:
         return found
 
     def integrals(
-        self, pairs: Sequence[tuple[str, str]], shaking: Shaking, orders: Sequence[int]
+        self,
+        outputs: Sequence[str],
+        pairs: Sequence[tuple[str, str]],
+        shaking: Shaking,
+        orders: Sequence[int],
     ) -> Any:
-        """Return integrals of Re conj(F_one) S F_other over all disturbances, moments among them.
+        """Return integrals of Re conj(F_one) S F_other over all disturbances: moments, covariances.
 
         Parameters
         ----------
-        pairs, orders
-            The two outputs of each integral, and the powers of omega in it.
+        outputs, pairs, orders
+            The outputs of which it is with themselves, then pairs of them, and the powers of omega.
         shaking
             S, its diagonal first and then what is beside it, one after the other.
 
         Returns
         -------
         ndarray or Dual
-            (pairs, orders, ..., 1 + e).
+            (outputs and pairs, orders, ..., 1 + e).
         """
-        rows = {name: self.outputs.index(name) for pair in pairs for name in pair}
-        names = [*rows]
-        ones, others = np.array([[names.index(name) for name in pair] for pair in pairs]).T
-        found = self._all([*rows.values()])  # (z, nw, ..., k)
+        rows = [self.outputs.index(name) for name in outputs]
+        some = [[outputs.index(name) for name in pair] for pair in pairs]
+        ones, others = np.array([*((i, i) for i in range(len(rows))), *some]).T
+        found = self._all(rows)  # (z, nw, ..., k)
         powers = np.array([self._omega**order for order in orders])
-        weights = shaking.weights.reshape(shaking.weights.shape[0], *(1,) * (found.ndim - 3), -1)
-        own = found.view(np.float64)
-        products = (own[ones] * own[others] * np.repeat(weights, 2, axis=-1)).sum(axis=1)
-        value = [products @ np.repeat(powers, 2, axis=-1).T]
-        source, error = shaking.source, shaking.error
-        # Re share conj(a) b, and over all orders and shares at once.
+        between = (1,) * (found.ndim - 3)
+        shaken = found * shaking.weights.reshape(len(shaking.weights), *between, -1)
+        own, other = found.view(np.float64), shaken.view(np.float64)
+        each = [np.einsum("w...,w...->...", own[i], other[j]) for i, j in zip(ones, others, strict=True)]
+        values = [np.array(each) @ np.repeat(powers, 2, axis=-1).T]
+        # Of what is beside the diagonal Re share conj(a) b, for all orders and shares at once.
         shares = (powers[:, None] * shaking.shares).reshape(-1, powers.shape[1])
-        if len(shaking.shares):
-            crossed = found[ones, source].conj() * found[others, error]
-            crossed += found[ones, error] * found[others, source].conj()
-            value.append((crossed @ shares.T).real)
-        parts = [each.reshape(*each.shape[:-1], len(orders), -1) for each in value]
-        values = np.moveaxis(np.concatenate(parts, axis=-1), -2, 1)
+        from_source, from_error = found[:, shaking.source], found[:, shaking.error]
+        if len(shares):
+            crossed = from_source[ones].conj() * from_error[others]
+            crossed += from_error[ones] * from_source[others].conj()
+            values.append((crossed @ shares.T).real)
+        parts = [value.reshape(*value.shape[:-1], len(orders), -1) for value in values]
+        value = np.moveaxis(np.concatenate(parts, axis=-1), -2, 1)
         if self._closing.slopes is None:
-            return values
+            return value
+        slope = np.zeros((self.count, len(ones), len(orders), 1 + len(shaking.shares)))
+        through = self._through(rows).conj()
+        # Over the disturbances first: what is heard goes with what comes out.
         heard = [*dict.fromkeys(j for _, j in self._closing.slopes)]
-        turned = self._heard[heard].conj()
-        seen = [np.einsum("zwk,jwk->jzk", found * weights, turned)]
-        for share in shaking.shares:
-            part = turned[:, None, error] * (found[None, :, source] * share.conj())
-            seen.append(part + turned[:, None, source] * (found[None, :, error] * share))
-        back = np.array(seen)  # (1 + e, j, z, k)
-        through = self._through([*rows.values()]).conj()
-        slope = np.zeros((self.count, len(orders), len(seen) * len(pairs)))
+        together = np.einsum("zwk,jwk->jzk", shaken, self._heard[heard].conj())
         for (i, j), (at, change) in self._closing.slopes.items():
-            own, way = back[:, heard.index(j)], through[:, i]
-            both = own[:, ones] * way[others] + own[:, others] * way[ones]
+            back = together[heard.index(j)]
+            both = 2.0 * back * through[:, i]
+            more = [back[a] * through[b, i] + back[b] * through[a, i] for a, b in some]
             turns = (change[:, None] * powers).reshape(-1, change.shape[1])
-            added = _real_product(turns, both.reshape(slope.shape[2], -1))
-            slope[at] += added.reshape(len(at), len(orders), -1)
-        every = slope.reshape(self.count, len(orders), len(seen), len(pairs))
-        return Dual(values, every.transpose(0, 3, 1, 2))
+            added = _real_product(turns, np.array([*both, *more]))
+            slope[at, ..., 0] += added.reshape(len(at), len(orders), -1).swapaxes(1, 2)
+        for i, at, moved in self._changes if len(shares) else ():
+            for place, response in ((shaking.error, from_source), (shaking.source, from_error)):
+                both = response[ones] * through[others, i] + response[others] * through[ones, i]
+                share = shares if place == shaking.error else shares.conj()
+                turns = (moved[:, None, place] * share).reshape(-1, shares.shape[1])
+                added = _real_product(turns, both).reshape(len(at), len(orders), -1, len(ones))
+                slope[at, ..., 1:] += added.transpose(0, 3, 1, 2)
+        return Dual(value, slope)
 
     @cached_property
     def _changes(self) -> list[tuple[int, list[int], ComplexArray]]:

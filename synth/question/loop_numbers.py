@@ -136,8 +136,12 @@ def on_sides(problem: Problem, points: npt.NDArray[Any]) -> tuple[npt.NDArray[An
 
     Margins hold at both.
     """
-    sides = 2 if any(not element.lasting for element in problem.elements) else 1
+    sides = _sides(problem)
     return np.tile(points, sides), np.repeat(np.arange(sides) > 0, points.size)
+
+
+def _sides(problem: Problem) -> int:
+    return 1 if all(element.lasting for element in problem.elements) else 2
 
 
 #: From frequencies [rad/s], (k,), and where losses are none to the closed loop there.
@@ -188,6 +192,7 @@ class LoopNumbers:
         self._cost, self._margins = cost, margins
         self.omega, self._point = omega, point
         self._logs, self.extra = logs, extra
+        self._sides = _sides(problem)
         self._amplitude = exp(extra * 2.0) if goal is Goal.SEA else None
         self._fresh = fresh
         self._signs = np.zeros((1, len(shaking.shares)))
@@ -256,10 +261,6 @@ class LoopNumbers:
                 values = value_of(self._on_grid(of)).reshape(sides, -1)
                 found.append((limit.name, of, peaks(omega, values, *limit.followed)))
         return found
-
-    @property
-    def _sides(self) -> int:
-        return on_sides(self._problem, np.zeros(1))[0].size
 
     def _curves_of(self, channel: tuple[str, str] | None) -> list[Curve]:
         """Return the curves that a limit is on."""
@@ -366,15 +367,17 @@ class LoopNumbers:
         return real(joined(found))
 
     @cached_property
-    def _pairs(self) -> list[tuple[str, str]]:
-        """Every output with itself, and the two that a limit speaks of."""
-        both = {lim.outputs: None for lim in self._problem.limits if len(lim.outputs) == 2}
-        return [*((name, name) for name in self._cost.outputs), *both]
+    def _pairs(self) -> list[tuple[str, ...]]:
+        """Every output, and the two that a limit speaks of."""
+        pairs = {lim.outputs: None for lim in self._problem.limits if len(lim.outputs) == 2}
+        return [*((name,) for name in self._cost.outputs), *pairs]
 
     @cached_property
     def _every(self) -> Any:
         """Integrals of all pairs, (pairs, orders, ..., 1 + e): the mean, and what signs turn."""
-        return self._padded(self._cost.integrals(self._pairs, self._shaking, _ORDERS))
+        outputs = self._cost.outputs
+        pairs: Any = self._pairs[len(outputs) :]
+        return self._padded(self._cost.integrals(outputs, pairs, self._shaking, _ORDERS))
 
     @cached_property
     def _moments(self) -> Any:
@@ -384,14 +387,14 @@ class LoopNumbers:
     def moment(self, output: str, order: int) -> Any:
         """Return the spectral moment m_order of `output`, (1,), or by combination of signs."""
         # A programme's logarithms want it above zero, where error and motion cancel.
-        found = self._one((output, output), order)
+        found = self._one((output,), order)
         return at_least(found, _STILL) if self._signs.any() else found
 
     def covariance(self, one: str, other: str) -> Any:
         """Return the covariance of two outputs, (1,), or by combination of signs."""
         return self._one((one, other), 0)
 
-    def _one(self, pair: tuple[str, str], order: int) -> Any:
+    def _one(self, pair: tuple[str, ...], order: int) -> Any:
         row, at, every = self._pairs.index(pair), _ORDERS.index(order), self._moments
         if isinstance(every, Dual):
             found: Any = Dual(every.value[row, at], every.slope[:, row, at])
@@ -437,7 +440,7 @@ class LoopNumbers:
         total, variance = np.zeros((size, size)), 0.0
         for name, weight in self._problem.minimise.items():
             total += weight * self._cost.curvature(name, self._shaking.weights)
-            variance += weight * float(value_of(self._every)[self._pairs.index((name, name)), 0, 0])
+            variance += weight * float(value_of(self._every)[self._pairs.index((name,)), 0, 0])
         found = total / variance
         if isinstance(self.extra, Dual):
             found = np.pad(found, (0, 1))

@@ -70,18 +70,20 @@ def peaks(omega: FloatArray, values: ComplexArray, size: Size, above: float) -> 
     nodes, known = _about(omega, values, on, at + 1)
     each, place, right = np.arange(at.size), omega[at + 1], np.zeros(at.size, np.bool_)
     for _ in range(_ROUNDS):
-        ends = omega[at], omega[at + 2]
+        ends, terms = (omega[at], omega[at + 2]), _fraction(nodes, known)
         for _ in range(2):
             fine = np.linspace(*ends, _FINE)
-            guess = _interpolated(nodes, known, fine)
+            guess = _interpolated(nodes, terms, fine)
             depth = 1.0 / size(fine.ravel(), guess.ravel()).reshape(fine.shape) ** 2
-            least = np.nanargmin(np.where(np.isfinite(depth), depth, np.inf), axis=0)
+            depth = np.where(np.isfinite(depth), depth, np.inf)
+            least = depth.argmin(axis=0)
             near = np.clip(least, 1, _FINE - 2) + np.array([[-1], [0], [1]])
             ends = fine[near[0], each], fine[near[2], each]
-        vertex = _vertex(fine[near, each], depth[near, each])
-        vertex = np.where(np.isfinite(vertex), vertex, fine[least, each])
+        vertex, height = _vertex(fine[near, each], depth[near, each])
+        sound = np.isfinite(height)
+        vertex = np.where(sound, vertex, fine[least, each])
         place = np.where(right, place, vertex)
-        foretold = size(place, _interpolated(nodes, known, place))
+        foretold = np.where(sound, height, depth[least, each]) ** -0.5
         told = yield place, on
         right |= np.abs(size(place, told) - foretold) <= _FORETOLD * foretold
         if right.all():
@@ -108,10 +110,11 @@ def crossings(
         return
     low, high, rising = omega[at], omega[at + 1], values[on, at] < 0.0
     nodes, known = _about(omega, gains, on, at)
+    terms = _fraction(nodes, known)
     ends, each = (low, high), np.arange(at.size)
     for _ in range(2):
         fine = np.linspace(*ends, _FINE)
-        heights = height(_interpolated(nodes, known, fine))
+        heights = height(_interpolated(nodes, terms, fine))
         beyond = (heights[1:] >= 0.0) == rising
         beyond[-1] = True
         last = beyond.argmax(axis=0)
@@ -139,24 +142,29 @@ def _about(
     return omega[near], values[on, near]
 
 
-def _interpolated(nodes: FloatArray, known: ComplexArray, at: FloatArray) -> ComplexArray:
-    """Return curves known at nodes, (n, c), elsewhere, (..., c), as rational functions.
-
-    By Thiele's continued fraction, which follows a resonance; no number where it breaks down.
-    """
+def _fraction(nodes: FloatArray, known: ComplexArray) -> ComplexArray:
+    """Return Thiele's continued fractions, (n, c), of curves known at nodes, (n, c)."""
     terms = np.array(known, np.complex128)
     for k in range(1, len(terms)):
         terms[k:] = (nodes[k:] - nodes[k - 1]) / (terms[k:] - terms[k - 1])
+    return terms
+
+
+def _interpolated(nodes: FloatArray, terms: ComplexArray, at: FloatArray) -> ComplexArray:
+    """Return curves, (..., c), as rational functions: by `_fraction`, which follows a resonance.
+
+    There is no number where it breaks down.
+    """
     found = np.broadcast_to(terms[-1], at.shape)
     for k in reversed(range(len(terms) - 1)):
         found = terms[k] + (at - nodes[k]) / found
     return np.asarray(found)
 
 
-def _vertex(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the vertices of parabolas through three points each, (3, c), between them."""
+def _vertex(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where parabolas through three points each, (3, c), are least between them, and it."""
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
     bend = (right - left) / (x[2] - x[0])
     slope = left + bend * (x[1] - x[0])
-    step = -0.5 * slope / np.where(bend > 0.0, bend, np.inf)
-    return np.asarray(np.clip(x[1] + step, x[0], x[2]))
+    step = np.clip(-0.5 * slope / np.where(bend > 0.0, bend, np.inf), x[0] - x[1], x[2] - x[1])
+    return x[1] + step, y[1] + (slope + bend * step) * step

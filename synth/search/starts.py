@@ -280,8 +280,7 @@ def _consistent(
     names = [element.velocity for element in problem.elements]
     for _ in range(_DRAGS if names else 0):
         closing = Point(values=values, coefficients=known).closing(problem, blocks.s)
-        pairs = [(name, name) for name in names]
-        every = LoopResponses(blocks, closing).integrals(pairs, shaking, [0])
+        every = LoopResponses(blocks, closing).integrals(names, (), shaking, [0])
         variances = dict(zip(names, every[:, 0, ..., :1], strict=True))
         known = problem.coefficients_in(variances.__getitem__)
     return known
