@@ -84,6 +84,10 @@ class Dual:
             key = key[-1]
         return Dual(self.value[..., key], self.slope[..., key], self.at)
 
+    def row(self, *index: Any) -> Dual:
+        """Return some of the numbers, chosen along the first axes."""
+        return Dual(self.value[index], self.slope[(slice(None), *index)], self.at)
+
     def _spread(self, value: Array) -> Array:
         """Return the slopes in the shape of a value that was broadcast."""
         shape = (len(self.slope), *np.shape(value))

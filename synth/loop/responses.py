@@ -288,8 +288,9 @@ class LoopResponses:
         between = (1,) * (found.ndim - 3)
         shaken = found * shaking.weights.reshape(len(shaking.weights), *between, -1)
         own, other = found.view(np.float64), shaken.view(np.float64)
-        each = [np.einsum("w...,w...->...", own[i], other[j]) for i, j in zip(ones, others, strict=True)]
-        values = [np.array(each) @ np.repeat(powers, 2, axis=-1).T]
+        both = zip(own[ones], other[others], strict=True)
+        sums = np.array([np.einsum("w...,w...->...", one, other) for one, other in both])
+        values = [sums @ np.repeat(powers, 2, axis=-1).T]
         # Of what is beside the diagonal Re share conj(a) b, for all orders and shares at once.
         shares = (powers[:, None] * shaking.shares).reshape(-1, powers.shape[1])
         from_source, from_error = found[:, shaking.source], found[:, shaking.error]
@@ -342,10 +343,12 @@ class LoopResponses:
     def curvature(self, output: str, weights: FloatArray) -> FloatArray:
         """Return half the Gauss-Newton Hessian of an integral of |F|^2, (n, n); see `moments`."""
         left = self._through([self.outputs.index(output)])[0]
-        slope = np.zeros((self.count, weights.size), np.complex128)
-        for i, at, change in self._changes:
-            slope[at] += (change * (left[i] * np.sqrt(weights))).reshape(len(at), -1)
-        return _real_product(slope, slope)
+        parts = [change * (left[i] * np.sqrt(weights)) for i, _, change in self._changes]
+        slope = np.concatenate(parts).reshape(-1, weights.size)
+        of = np.concatenate([at for _, at, _ in self._changes])
+        found = np.zeros((self.count, self.count))
+        np.add.at(found, (of[:, None], of), _real_product(slope, slope))
+        return found
 
 
 def blocks_with(
@@ -385,18 +388,12 @@ def _inverse(a: ComplexArray) -> ComplexArray:
         determinant = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
         return np.asarray(np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / determinant)
     if len(a) == 3:
-        turned = np.array([[_cofactor(a, i, j) for i in range(3)] for j in range(3)])
-        return np.asarray(
-            turned / (a[0, 0] * turned[0, 0] + a[0, 1] * turned[1, 0] + a[0, 2] * turned[2, 0])
-        )
+        one, other = np.array([1, 2, 0]), np.array([2, 0, 1])
+        cofactors = a[one[:, None], one] * a[other[:, None], other]
+        cofactors -= a[one[:, None], other] * a[other[:, None], one]
+        return np.asarray(cofactors.swapaxes(0, 1) / (a[0] * cofactors[0]).sum(axis=0))
     found: ComplexArray = np.linalg.inv(np.moveaxis(a, (0, 1), (-2, -1))).astype(np.complex128)
     return np.moveaxis(found, (-2, -1), (0, 1))
-
-
-def _cofactor(a: ComplexArray, i: int, j: int) -> Any:
-    """Return the cofactor of an entry of 3 x 3 matrices on the first two axes."""
-    (i, k), (j, m) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
-    return a[i, j] * a[k, m] - a[i, m] * a[k, j]
 
 
 def with_loops(cross: ComplexArray, felt: ComplexArray, gains: FloatArray) -> FloatArray:

@@ -197,7 +197,7 @@ class LoopNumbers:
         self._fresh = fresh
         self._signs = np.zeros((1, len(shaking.shares)))
         self._grid: dict[Curve, Any] = {}
-        self._peaks: dict[tuple[str, float], Any] = {}
+        self._peaks: dict[float, Any] = {}
 
     def under(self, problem: Problem, shaking: Shaking) -> LoopNumbers:
         """Return the same loop shaken by the disturbances of another problem."""
@@ -382,25 +382,28 @@ class LoopNumbers:
     @cached_property
     def _moments(self) -> Any:
         """Moments and covariances by combination of signs, (pairs, orders, ..., c)."""
-        return self._every @ np.vstack([np.ones(len(self._signs)), self._signs.T])
+        found = self._every @ np.vstack([np.ones(len(self._signs)), self._signs.T])
+        if self._amplitude is None:
+            return found
+        if isinstance(found, Dual):
+            return found * Dual(self._amplitude.value, self._amplitude.slope[:, None, None])
+        return found * self._amplitude
+
+    def _rows(self, which: int | slice, order: int) -> Any:
+        at, every = _ORDERS.index(order), self._moments
+        return every.row(which, at) if isinstance(every, Dual) else every[which, at]
 
     def moment(self, output: str, order: int) -> Any:
         """Return the spectral moment m_order of `output`, (1,), or by combination of signs."""
-        # A programme's logarithms want it above zero, where error and motion cancel.
-        found = self._one((output,), order)
-        return at_least(found, _STILL) if self._signs.any() else found
+        return self._positive(self._rows(self._pairs.index((output,)), order))
 
     def covariance(self, one: str, other: str) -> Any:
         """Return the covariance of two outputs, (1,), or by combination of signs."""
-        return self._one((one, other), 0)
+        return self._rows(self._pairs.index((one, other)), 0)
 
-    def _one(self, pair: tuple[str, ...], order: int) -> Any:
-        row, at, every = self._pairs.index(pair), _ORDERS.index(order), self._moments
-        if isinstance(every, Dual):
-            found: Any = Dual(every.value[row, at], every.slope[:, row, at])
-        else:
-            found = every[row, at]
-        return found if self._amplitude is None else found * self._amplitude
+    def _positive(self, moment: Any) -> Any:
+        # A programme's logarithms want it above zero, where error and motion cancel.
+        return at_least(moment, _STILL) if self._signs.any() else moment
 
     @cached_property
     def signed(self) -> LoopNumbers:
@@ -418,12 +421,14 @@ class LoopNumbers:
 
     def peak(self, output: str, duration: float) -> Any:
         """Return the most probable maximum of `output` in `duration` [s], as its moments are."""
-        if (output, duration) not in self._peaks:
-            m0, m2 = self.moment(output, 0), self.moment(output, 2)
+        row, outputs = self._pairs.index((output,)), slice(0, len(self._cost.outputs))
+        if duration not in self._peaks:
+            m0, m2 = (self._positive(self._rows(outputs, order)) for order in _ORDERS)
             cycles = sqrt(m2 / m0) * (duration / (2.0 * np.pi))
             factor = sqrt(log(at_least(cycles, _LEAST_CYCLES)) * 2.0)
-            self._peaks[output, duration] = factor * sqrt(m0)
-        return self._peaks[output, duration]
+            self._peaks[duration] = factor * sqrt(m0)
+        every = self._peaks[duration]
+        return every.row(row) if isinstance(every, Dual) else every[row]
 
     def cost(self) -> Any:
         """Return the logarithm of the square root of the weighted variance, (1,)."""

@@ -27,10 +27,12 @@ IntArray = npt.NDArray[np.intp]
 Search = Generator[tuple[FloatArray, IntArray], ComplexArray, None]
 
 _SHIFT = 1e-6  # relative, of a frequency, of differences
-_NODES, _FINE = 7, 33  # known points that interpolation takes, and how finely it is looked at
+_NODES = 7  # known points that interpolation takes
+_SHARES = np.linspace(0.0, 1.0, 33)[:, None]  # of an interval, where it is looked at
 _ROUNDS = 4
 _FORETOLD = 1e-7  # relative error of interpolation at a peak that counts as none
 _HAIR = 1e-4  # of the distance of known points: a last step of Newton's towards a crossing
+_BESIDE = np.array([[-1], [0], [1]])
 
 
 def together(
@@ -72,12 +74,12 @@ def peaks(omega: FloatArray, values: ComplexArray, size: Size, above: float) -> 
     for _ in range(_ROUNDS):
         ends, terms = (omega[at], omega[at + 2]), _fraction(nodes, known)
         for _ in range(2):
-            fine = np.linspace(*ends, _FINE)
+            fine = ends[0] + (ends[1] - ends[0]) * _SHARES
             guess = _interpolated(nodes, terms, fine)
             depth = 1.0 / size(fine.ravel(), guess.ravel()).reshape(fine.shape) ** 2
             depth = np.where(np.isfinite(depth), depth, np.inf)
             least = depth.argmin(axis=0)
-            near = np.clip(least, 1, _FINE - 2) + np.array([[-1], [0], [1]])
+            near = np.minimum(np.maximum(least, 1), _SHARES.size - 2) + _BESIDE
             ends = fine[near[0], each], fine[near[2], each]
         vertex, height = _vertex(fine[near, each], depth[near, each])
         sound = np.isfinite(height)
@@ -113,7 +115,7 @@ def crossings(
     terms = _fraction(nodes, known)
     ends, each = (low, high), np.arange(at.size)
     for _ in range(2):
-        fine = np.linspace(*ends, _FINE)
+        fine = ends[0] + (ends[1] - ends[0]) * _SHARES
         heights = height(_interpolated(nodes, terms, fine))
         beyond = (heights[1:] >= 0.0) == rising
         beyond[-1] = True
@@ -166,5 +168,6 @@ def _vertex(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
     bend = (right - left) / (x[2] - x[0])
     slope = left + bend * (x[1] - x[0])
-    step = np.clip(-0.5 * slope / np.where(bend > 0.0, bend, np.inf), x[0] - x[1], x[2] - x[1])
+    step = -0.5 * slope / np.where(bend > 0.0, bend, np.inf)
+    step = np.minimum(np.maximum(step, x[0] - x[1]), x[2] - x[1])
     return x[1] + step, y[1] + (slope + bend * step) * step

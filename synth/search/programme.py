@@ -25,7 +25,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -337,10 +338,14 @@ class Programme:
         with np.errstate(all="ignore"):
             costs, rows, balances, curvatures = self._parts(x, tighten, slopes=True)
         values, slopes, firm = [], [], []
-        for key, row, i in rows:
-            values.append(np.ravel(row.value))
-            slopes.append(self._spread(row, i, at))
-            firm.append(np.full(row.value.size, key[1] == _CALM))
+        for i, group in groupby(rows, key=itemgetter(2)):
+            every = [(key, row.value.ravel(), row.slope) for key, row, _ in group]
+            value = np.concatenate([value for _, value, _ in every])
+            slope = np.concatenate([s.reshape(len(s), -1) for _, _, s in every], axis=1)
+            values.append(value)
+            slopes.append(self._spread(Dual(value, slope), i, at))
+            calm = [key[1] == _CALM for key, _, _ in every]
+            firm.append(np.repeat(calm, [value.size for _, value, _ in every]))
         spread = [(float(c.value.item()), self._spread(c, i, at)[0]) for c, i in costs]
         slope = np.zeros(self.size)
         if self._extra_at is not None:
