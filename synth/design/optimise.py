@@ -55,7 +55,7 @@ NESTED = (
 )
 _AS_STILL = 1.05  # of the stillest design's motion, with which a simpler one is preferred
 _ROUGHEST = 0.99  # of the largest sea that any structure can do
-_SHARE = 4  # of the starts that each of several structures has
+_SHARE = 2  # of the starts that each of several structures has
 ROUNDS = 6  # of asking an answer for what the rope asks of it
 _RESUMED = 3  # ends of a search that the next one, on more masses, begins from
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
@@ -75,7 +75,7 @@ def optimise_gains(
     members: Sequence[Mapping[str, Any] | Case] = (),
     objective: str = "worst",
     fixed: Mapping[str, float] | None = None,
-    starts: int = 16,
+    starts: int = 8,
     seed: int = 0,
     progress: Progress | None = None,
     guesses: Sequence[Mapping[str, float]] = (),

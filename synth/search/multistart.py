@@ -3,8 +3,8 @@
     Family -> starts -> rough descents -> places -> starts far about the best -> more places
            -> descents to the end -> distinct answers -> polished -> Found
 
-A single plant is a family of one.  The first descents stop once six of them, and most, come by one
-place; what they all miss is looked for about the best.
+A single plant is a family of one.  The first descents stop once three of them, and most, come by
+one place; what they all miss is looked for about the best, until three come back to one as good.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from .starts import begin_points, briskest, scattered, start_coefficients
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_LEAST = 10  # starts that are drawn at least, if no six agree before
-_ENOUGH, _MOST = 6, 0.6  # starts, and share of all, that come by one place: no more are needed
+_LEAST = 6  # starts that are drawn at least, if no three agree before
+_ENOUGH, _MOST = 3, 0.6  # starts, and share of all, that come by one place: no more are needed
 _SCATTER, _MOST_SCATTER, _HOPS = 2, 12, 3  # starts about the best, by parameter; most; how often
+_AS_GOOD = 5e-3  # of the log cost, by which rough answers may differ that are as good
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one
@@ -224,8 +225,8 @@ def _come_by(
     begin: FloatArray,
     coefficients: Sequence[Coefficients],
     reference: FloatArray,
-) -> None:
-    """Add a start to the places where it leads."""
+) -> _Place:
+    """Return the place where a start leads, with the start added to it."""
     # By discs and by true margins in turns: each of them finds basins that the other misses.
     exact = sum(len(place.begins) for place in places) % 2 == 1
     coarse = settle(family, begin, coefficients, reference=reference, rounds=1, exact=exact)
@@ -241,6 +242,7 @@ def _come_by(
         place = _Place(coarse)
         places.append(place)
     place.begins.append(begin)
+    return place
 
 
 def _hopped(
@@ -253,16 +255,23 @@ def _hopped(
 ) -> None:
     """Add the places that starts far about the best one lead to, and about any that is better."""
     count = min(_SCATTER * min(starts, len(family.parameters)), _MOST_SCATTER)
-    best: _Place | None = None
+    about = np.inf  # log cost of the place that was looked about last
     for _ in range(_HOPS):
         arrived = [place for place in places if place.arrived]
-        if not arrived or min(arrived, key=lambda p: p.coarse.objective) is best:
+        if not arrived:
             return
         best = min(arrived, key=lambda p: p.coarse.objective)
+        if best.coarse.objective > about - _AS_GOOD:
+            return
+        about = best.coarse.objective
         begins = scattered(family, best.coarse.values, count, seed)
+        back = 0
         for k, begin in enumerate(begins):
             tell("hops", k, len(begins))
-            _come_by(family, places, begin, best.coarse.coefficients, reference)
+            end = _come_by(family, places, begin, best.coarse.coefficients, reference).coarse
+            back += end.converged and abs(end.objective - about) < _AS_GOOD
+            if back == _ENOUGH:
+                break
         tell("hops", len(begins), len(begins))
 
 

@@ -22,6 +22,7 @@ from .sqp import INFEASIBLE
 
 KEPT = 1e-5  # relative excess over a limit that counts as none
 _PER_DECADE, _FINE_PER_DECADE = 40, 60  # margin nodes
+_ROUGH_STEPS = 60  # of a rough descent, which goes on where it may be the best
 _ROUNDS, _FINE_ROUNDS = 3, 4  # of a descent with new nodes
 _SETTLED, _FINE_SETTLED = 1e-4, 1e-6  # change of the log objective below which nodes are right
 _HAIR = 2e-2  # relative excess that tightening may still mend
@@ -80,6 +81,7 @@ def stated(
         reference=reference,
         relaxed=relaxed,
         tolerance=tolerance,
+        max_iterations=_ROUGH_STEPS if rough else None,
         exact=exact,
         # Rough descents look whether a start leads anywhere: of one that gets stuck there are more.
         in_a_calm=not rough,

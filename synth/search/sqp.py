@@ -40,7 +40,7 @@ _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends the
 _HOPELESS = 0.999  # share of what rows are broken by that is left where nothing near mends them
 INFEASIBLE = "the limits exclude each other"
 UNFINISHED = "maximum of iterations"
-_CREEPS, _CREPT = 20, 1e-6  # steps that together gain less than this have arrived
+_CREEPS, _CREPT = 10, 1e-6  # steps that together gain less than this have arrived
 _NOTHING = 1e-7  # of the objective, promised where no step helps: slopes and values round
 _KEPT = 1e-8  # row that counts as kept
 _SKIPPED = 1e-6  # an update along less than this share of a step is left out
@@ -199,8 +199,8 @@ def descend(
         elif share < 0.25:
             room = 0.5 * min(room, length)
         x, at = moved, new
-        reached = [*reached, at.objective] if at.broken <= _KEPT else []
-        if len(reached) > _CREEPS and reached[-_CREEPS - 1] - at.objective < _CREPT:
+        reached = [*reached, at.objective] if at.broken <= max(_KEPT, tolerance) else []
+        if len(reached) > _CREEPS and reached[-_CREEPS - 1] - at.objective < max(_CREPT, tolerance):
             return _ended(x, at, prices, "", k + 1)
         if prices.size != at.rows.size:
             prices = np.zeros(at.rows.size)
@@ -322,7 +322,7 @@ def _tried(
     if new is None or not new.finite:
         return there, None, -np.inf
     share = kept(new)
-    if share < 0.25 and new.rows.size == at.rows.size and weight * new.broken > 0.1 * promised:
+    if share < 0.75 and new.rows.size == at.rows.size and weight * new.broken > 0.1 * promised:
         # Rows curve: a second step takes up what the first one left broken.
         rows = new.rows - at.jacobian @ step
         equations = new.equations - at.equation_slopes @ step

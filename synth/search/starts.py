@@ -35,7 +35,7 @@ from .nodes import around, cost_nodes, margin_nodes
 _CANDIDATES = 512
 _TRIED = 64  # candidates that say which member of a family is the hardest
 _ENOUGH = 8  # stable ones: no more are made of unstable ones
-_SCATTERED, _FAR = 9, 1.5  # candidates about an answer (a power of two), and how far in decades
+_SCATTERED, _FAR = 7, 1.5  # candidates about an answer (a power of two), and how far in decades
 _FROM_ZERO = 0.1  # of its scale: about which a parameter is scattered that is smaller
 _SPREAD = 0.5  # least distance of two starts, in decades over all parameters
 _LEASH = 1e-3  # price of moving a parameter by a factor of e, squared
