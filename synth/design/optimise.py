@@ -407,7 +407,8 @@ def _again(
     """Return the answer for more members or more rope masses, from the ends of a search.
 
     The answer is polished where it stands.  What else the search came upon is gone to the end of
-    only where it was better before than the answer is now, as neither members nor masses gain much.
+    only where it was better before than the answer is now, as neither members nor masses gain much,
+    and only once: it then costs without end.
     """
     solved = tuning.found.solved
     ranked = sorted((s for s in tuning.starts if s.converged), key=lambda s: -s.cost)
@@ -424,10 +425,14 @@ def _again(
     found = standing
     if standing is None:
         found = search(family, 1, seed, ends, progress, only_guesses=True)
-    elif better := [s.end for s in others[1:] if s.cost < family.total(standing.costs)]:
+    elif better := [s for s in others[1:] if s.cost < family.total(standing.costs)]:
         # What was better before may break the limits of the others: then the answer stands.
-        other = search(family, 1, seed, better, progress, only_guesses=True, kept_only=True)
+        resumed = [s.end for s in better]
+        other = search(family, 1, seed, resumed, progress, only_guesses=True, kept_only=True)
         found = other if _beats(other, standing) else standing
+        spent = {f"{s.cost:.4g}" for s in better}
+        tried = (replace(s, cost=np.inf) if f"{s.cost:.4g}" in spent else s for s in tuning.starts)
+        tuning = replace(tuning, starts=tuple(tried))
     assert found is not None
     again = tuning_of(family, no_worse(family, found, known))
     if not again.ok and tuning.ok:

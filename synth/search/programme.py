@@ -547,12 +547,10 @@ class _Loop:
         s is that of det(I - C yu) by the parameters over that by s.
         """
         problem = self.problem
+        still = problem.still(np.exp(logs).tolist())
         calm, dragged = (
             poles[poles.imag > 0.0]
-            for poles in map(
-                partial(problem.loop_poles, values),
-                (problem.nothing, problem.still(np.exp(logs).tolist())),
-            )
+            for poles in problem.lively_poles(values, problem.nothing, still)
         )
         if not calm.size or not dragged.size:
             calm = dragged = calm[:0]
