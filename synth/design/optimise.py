@@ -369,7 +369,7 @@ def _answer(
         return posed, tuning
     posed = posed.on(_fitted(posed.alone(one), tuning).masses)
     family = posed.problem if drive else posed.without_drive
-    again = _again(family, tuning, starts, seed, progress, known)
+    again = _again(family, tuning, starts, seed, progress, known, anew=True)
     last = not drive or not any(question.drive for question in posed.questions)
     if not again.ok and last and len(posed.questions) > posed.given:
         agreed = tuning.ok
@@ -403,12 +403,15 @@ def _again(
     seed: int,
     progress: Progress | None,
     known: Sequence[Sequence[float]] = (),
+    *,
+    anew: bool = False,
 ) -> Tuning:
     """Return the answer for more members or more rope masses, from the ends of a search.
 
     The answer is polished where it stands.  What else the search came upon is gone to the end of
     only where it was better before than the answer is now, as neither members nor masses gain much,
-    and only once: it then costs without end.
+    and only once: it then costs without end.  If the answer cannot be kept, the ends are guesses of
+    a search, which starts elsewhere too if it is to look `anew`.
     """
     solved = tuning.found.solved
     ranked = sorted((s for s in tuning.starts if s.converged), key=lambda s: -s.cost)
@@ -424,7 +427,8 @@ def _again(
         standing = _where_it_stands(family, tuning.found)
     found = standing
     if standing is None:
-        found = search(family, 1, seed, ends, progress, only_guesses=True)
+        wide = anew and tuning.ok and family.objective is not Objective.REGRET
+        found = search(family, starts if wide else 1, seed, ends, progress, only_guesses=not wide)
     elif better := [s for s in others[1:] if s.cost < family.total(standing.costs)]:
         # What was better before may break the limits of the others: then the answer stands.
         resumed = [s.end for s in better]
