@@ -96,14 +96,18 @@ class Resolvent:
     def _by_back_substitution(self, C: FloatArray, B: FloatArray) -> Transfer:
         T, into, out_of = self._triangular
         right, left, paths = into @ B, C @ out_of, self._paths(C, B)
+        # From the side with fewer columns: the transpose, upside down, is upper triangular too.
+        turned = len(C) < B.shape[1]
+        matrix, known = (T[::-1, ::-1].T, left[:, ::-1].T) if turned else (T, right)
 
         def transfer(s: ComplexArray) -> ComplexArray | None:
             found = np.empty((s.size, len(C), B.shape[1]), dtype=np.complex128)
             for start in range(0, s.size, _CHUNK):
-                x = _back_substituted(T, right, s[start : start + _CHUNK])
+                x = _back_substituted(matrix, known, s[start : start + _CHUNK])
                 if x is None:
                     return None
-                found[start : start + _CHUNK] = left @ x
+                part = x[:, ::-1].transpose(0, 2, 1) @ right if turned else left @ x
+                found[start : start + _CHUNK] = part
             return found * paths
 
         return transfer
