@@ -21,7 +21,7 @@ from ..question import FamilyLoop, FamilyProblem, Goal, Problem, Values
 from .polishing import KEPT, assess, polish, settle, stated
 from .programme import Solution
 from .sqp import UNFINISHED
-from .starts import begin_points, briskest, scattered, start_coefficients
+from .starts import begin_points, briskest, others_of, scattered, start_coefficients
 
 Progress = Callable[[str, int, int], None]
 
@@ -151,7 +151,9 @@ def search(
     tell = progress or (lambda stage, done, total: None)
     family = FamilyProblem.of(asked)
     kept = [np.asarray(guess, dtype=np.float64) for guess in guesses]
-    count = len(kept) + max(starts - len(kept), _LEAST)
+    # Of a law that draws others besides its guesses, one optimum of several is soon agreed upon.
+    share = 2 if not only_guesses and len(others_of(family.scenarios[0].problem, seed)) else 1
+    count = len(kept) + max(starts - len(kept), share * _LEAST)
     begins = [guess for guess in kept if family.stable(guess)] if only_guesses else []
     if not begins and not kept_only:
         # The reserve is picked together with the starts, so that it lies apart from them.
@@ -159,7 +161,7 @@ def search(
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
-    places = _places(family, begins, reference, count, len(kept), tell)
+    places = _places(family, begins, reference, count, len(kept), share * _ENOUGH, tell)
     if not only_guesses:
         _hopped(family, places, reference, starts, seed, tell)
     records, first = _descents(family, places, reference, starts, tell)
@@ -204,6 +206,7 @@ def _places(
     reference: FloatArray,
     count: int,
     guesses: int,
+    enough: int,
     tell: Progress,
 ) -> list[_Place]:
     """Return where starts roughly lead, until enough of them agree."""
@@ -211,7 +214,7 @@ def _places(
     for k, begin in enumerate(begins):
         if k >= count and any(place.arrived for place in places):
             break  # the reserve is for a search of which no start has arrived yet
-        if k >= guesses and _agreed(places):
+        if k >= guesses and _agreed(places, enough):
             break
         tell("starts", min(k, count - 1), count)
         _come_by(family, places, begin, start_coefficients(family), reference)
@@ -326,10 +329,10 @@ class _Place:
         return self.coarse.converged
 
 
-def _agreed(places: Sequence[_Place]) -> bool:
+def _agreed(places: Sequence[_Place], enough: int = _ENOUGH) -> bool:
     """Return whether so many starts come by one place that more of their kind would too."""
     arrived = [len(place.begins) for place in places if place.arrived]
-    return max(arrived, default=0) >= max(_ENOUGH, _MOST * sum(arrived))
+    return max(arrived, default=0) >= max(enough, _MOST * sum(arrived))
 
 
 def _same(family: FamilyProblem, one: Solution, other: Solution) -> bool:
