@@ -26,7 +26,7 @@ from .starts import begin_points, briskest, others_of, scattered, start_coeffici
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_LEAST = 6  # starts that are drawn at least, if no three agree before
+_LEAST = 6  # starts that are drawn at least, however many agree before
 _ENOUGH, _MOST = 3, 0.6  # starts, and share of all, that come by one place: no more are needed
 _SCATTER, _MOST_SCATTER, _HOPS = 2, 12, 3  # starts about the best, by parameter; most; how often
 _AS_GOOD = 5e-3  # of the log cost, by which rough answers may differ that are as good
@@ -214,7 +214,7 @@ def _places(
     for k, begin in enumerate(begins):
         if k >= count and any(place.arrived for place in places):
             break  # the reserve is for a search of which no start has arrived yet
-        if k >= guesses and _agreed(places, enough):
+        if k >= guesses + _LEAST and _agreed(places, enough):
             break
         tell("starts", min(k, count - 1), count)
         _come_by(family, places, begin, start_coefficients(family), reference)

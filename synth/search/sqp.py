@@ -322,7 +322,11 @@ def _tried(
     if new is None or not new.finite:
         return there, None, -np.inf
     share = kept(new)
-    if share < 0.75 and new.rows.size == at.rows.size and weight * new.broken > 0.1 * promised:
+    if (
+        share < (0.75 if at.broken < 1e-2 else 0.25)
+        and new.rows.size == at.rows.size
+        and weight * new.broken > 0.1 * promised
+    ):
         # Rows curve: a second step takes up what the first one left broken.
         rows = new.rows - at.jacobian @ step
         equations = new.equations - at.equation_slopes @ step
