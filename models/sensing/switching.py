@@ -131,6 +131,7 @@ class SwitchingNoise:
     #: Torque per command [N m/u] of a motor that stands, and its lag [s].
     gain: float
     lag: float
+    slowest: float = SWITCHING_BAND[0]  #: Frequency below which none is counted [rad/s].
 
     @classmethod
     def of(cls, data: PlantData, hook: HookMotion) -> SwitchingNoise | None:
@@ -152,7 +153,7 @@ class SwitchingNoise:
     @property
     def band(self) -> tuple[float, float]:
         """Band that holds the variance [rad/s]."""
-        return SWITCHING_BAND
+        return self.slowest, SWITCHING_BAND[1]
 
     @property
     def splits(self) -> tuple[float, ...]:

@@ -44,6 +44,7 @@ from models.sensing import (
     ENCODER,
     MEASURED,
     SET_POINT,
+    SwitchingNoise,
     aboard,
     sensed_line_at,
     sensed_plant,
@@ -70,6 +71,7 @@ _SHAKEN = "payload.force"
 _FORCE = 0.1  # of the faint noise, on the payload
 _MRU = ("mru.heave", "mru.heave_rate")
 _FINE = 24  # rope masses on which the best found is made, if the bound has no more
+_SLOWEST = 1e-2  # of the losses' remnant [rad/s]
 _TIGHTER = 0.98  # of a disk of S, for what the truncation moves
 _NUMBERS, _FEWEST, _MOST = 120, 12, 24  # free numbers of Q, and its functions a measurement
 
@@ -225,16 +227,30 @@ class _Terms:
         found = sensed_line_at(self.case, 1j * omega, drag=self.drag, friction=self.friction)
         return found.select(measurements=self.heard).yu[:, :, 0]
 
-    def shaken(self, masses: int) -> tuple[LinearPlant, dict[str, Any], tuple[str, ...]]:
+    def shaken(
+        self, masses: int, *, remnant: bool = False
+    ) -> tuple[LinearPlant, dict[str, Any], tuple[str, ...]]:
         """Return the plant with its faint noise, the spectra, and what is faint."""
         spectra = _heard_by(sensed_spectra(self.case, self.hook), self.heard)
+        noise = spectra.pop(SET_POINT, None)
+        if remnant and isinstance(noise, SwitchingNoise):
+            # A filter that foretells what is slower still has states that hardly decay.
+            spectra[SET_POINT] = replace(noise, slowest=_SLOWEST)
         return faint_noise(self.case, self.plant(masses), self.hook, spectra, self.faint)
 
     def bound(
-        self, masses: int, *, refits: int = 2, begin: Mapping[str, float] | None = None
+        self,
+        masses: int,
+        *,
+        remnant: bool = False,
+        refits: int = 2,
+        begin: Mapping[str, float] | None = None,
     ) -> Bound:
-        """Return the bound on so many rope masses."""
-        plant, spectra, _ = self.shaken(masses)
+        """Return the bound on so many rope masses.
+
+        It is as good a bound without the losses' remnant, which is none with the drum held.
+        """
+        plant, spectra, _ = self.shaken(masses, remnant=remnant)
         return lqg_bound(
             plant,
             spectra,
@@ -328,6 +344,7 @@ def high_order_for(
     *,
     measurements: Sequence[str],
     drag: float | None = None,
+    friction: float = 0.0,
     rooms: Mapping[str, float] | None = None,
     states: int | None = None,
 ) -> HighOrder:
@@ -335,14 +352,15 @@ def high_order_for(
 
     M_s and gain margins hold as a disk of S that is no larger than they ask for; limits on slow
     motion and on roll-off as they are; those on peaks as limits on an rms.  Those on power and on
-    the delay margin are left out.  Drag is linear [N s/m], by default that with the drum held;
-    `rooms` are limits on the rms of signals, where they are to be tighter than the case's, by
-    name.  It has at most so many states.
+    the delay margin are left out.  Drag is linear [N s/m], by default that with the drum held, and
+    so is the `friction` of losses [N m s/rad]; `rooms` are limits on the rms of signals, where they
+    are to be tighter than the case's, by name.  It has at most so many states.
 
     Raises SynthesisError if none is found.
     """
     question = pose(case)
-    terms = _terms(question, measurements, question.drag_before if drag is None else drag, _FAINT)
+    still = question.drag_before if drag is None else drag
+    terms = _terms(question, measurements, still, _FAINT, friction)
     given, limits = rooms or {}, case.limits
     room = {n: min(limit, given.get(n, math.inf)) for n, limit in terms.limits.items()}
     disk = gain_disk(limits.max_sensitivity, limits.gain_margin_up, limits.gain_margin_down)
@@ -352,6 +370,7 @@ def high_order_for(
         states=states,
         disk=(disk[0], _TIGHTER * disk[1]),
         shapes=[m for m in question.limits if isinstance(m, LowFrequency | RollOff)],
+        remnant=True,
     )
 
 
@@ -361,12 +380,13 @@ def _high_order(
     *,
     begin: Mapping[str, float] | None = None,
     states: int | None = None,
+    remnant: bool = False,
     **limits: Any,
 ) -> HighOrder:
     """Return the best found within an M_s, on a rope that is fine enough to hold on the line."""
     modal = terms.case.rope.lumping != "thesis"
     fine = max(_FINE, terms.masses) if modal else terms.masses
-    bound = terms.bound(fine, refits=0, begin=begin)
+    bound = terms.bound(fine, remnant=remnant, refits=0, begin=begin)
     plant = terms.plant(MAX_MASSES) if modal else bound.plant
     truth = Truth(plant=plant, line=terms.line if modal else None)
     heard = len(bound.plant.measurements)
@@ -535,5 +555,4 @@ def _heard_by(spectra: Mapping[str, Any], measurements: Sequence[str]) -> dict[s
     heard = set(measurements)
     own = {f"{name}{end}": {name} for name in MEASURED for end in ("_noise", ".faint")}
     own["mru.error"] = set(_MRU)
-    own[SET_POINT] = set()  # with less to shake it a bound is as good a bound
     return {name: value for name, value in spectra.items() if own.get(name, heard) & heard}

@@ -9,8 +9,10 @@ what its loop makes of them is measured, and asked of the next one, until all li
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
+from models.basics import SynthesisError
 from models.case import Case
 from models.plant import MAX_MASSES
 
@@ -21,7 +23,7 @@ from ..question import DesignQuestion, pose
 from ..search import Progress
 from ..structures import LowOrderLaw
 
-_ROUNDS = 6
+_ROUNDS = 10
 _SPARE = 0.98  # of the rms that would just keep a limit
 
 
@@ -49,26 +51,44 @@ def high_order_gains(
     masses = 1 if case.rope.lumping == "thesis" else MAX_MASSES
     question = pose(case, "high-order", masses)
     rooms: dict[str, float] = {}
+    made: dict[str, float] = {}  # of the signals in `rooms`, by the controller found last
+    best: tuple[float, DesignQuestion, Mapping[str, float]] | None = None
     drag = question.drag_before
+    friction = sum(element.begin for element in question.elements if not element.lasting)
     for done in range(_ROUNDS):
         if progress is not None:
             progress("high order", done, _ROUNDS)
-        found = high_order_for(
-            case,
-            measurements=question.structure.measurements,
-            drag=drag,
-            rooms=rooms,
-            states=order,
-        )
+        try:
+            found = high_order_for(
+                case,
+                measurements=question.structure.measurements,
+                drag=drag,
+                friction=friction,
+                rooms=rooms,
+                states=order,
+            )
+        except SynthesisError:
+            if best is None:
+                raise
+            # What was asked for cannot be had: half of the way to it.
+            rooms = {name: math.sqrt(room * made[name]) for name, room in rooms.items()}
+            continue
         question = pose(case, f"high-order-{found.order}", masses)
         assert isinstance(question.law, LowOrderLaw)
         parameters = question.named([float(v) for v in question.law.values(found.controller)])
         view = question.assess(parameters)
-        drag = question.equivalents(view.coefficients)[0] if question.drag is not None else drag
-        if all(limit.use(limit.worst(view)) <= 1.0 for limit in question.limits):
+        if question.drag is not None:
+            drag = question.equivalents(view.coefficients)[0]
+        friction = question.equivalents(view.coefficients)[1]
+        use = max(limit.use(limit.worst(view)) for limit in question.limits)
+        if best is None or use < best[0]:
+            best = use, question, parameters
+        if use <= 1.0:
             break
         rooms |= _rooms(question, view)
-    return question, parameters
+        made = {name: view.sigma(name) for name in rooms}
+    assert best is not None
+    return best[1], best[2]
 
 
 def _rooms(question: DesignQuestion, view: Assessment) -> dict[str, float]:

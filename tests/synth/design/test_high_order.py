@@ -89,9 +89,7 @@ def test_on_the_crane_all_limits_are_kept_on_the_exact_rope() -> None:
     assert design.limits["motor.power.peak"].use <= 1.0
     assert design.limits["gain_margin_down"].use <= 1.0
     assert "verified on the distributed rope" in str(design.verification)
-    # What no linear plant knows of: the loss of the gear, which switches with the direction.
-    easy = case.replace({"winch.gearbox.efficiency": 1.0})
-    still, real = (sh.simulate(each, design, duration=900.0).runs[0] for each in (easy, case))
-    assert still.completed
-    assert np.std(np.asarray(still["payload.displacement"])) < 8e-3
-    assert 8e-3 < np.std(np.asarray(real["payload.displacement"])) < 0.1 * design.hook_rms
+    # It was made with the loss of the gear, which switches with the direction.
+    real = sh.simulate(case, design, duration=900.0).runs[0]
+    assert real.completed
+    assert np.std(np.asarray(real["payload.displacement"])) < 1.1 * design.payload_rms
