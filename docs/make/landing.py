@@ -33,6 +33,8 @@ SEEDS = 20
 SETTLED = 10.0  # after the set-point has come to rest, before the payload counts as held [s]
 SCENARIO_PAYS_OUT = 8.0  # to the seabed and half a metre more [m]
 BOUNCE = 10.0  # after touchdown, in which a bounce counts [s]
+#: The law of the rope's damping that the page was made with.
+LAW: Mapping[str, object] = {"rope.damping_law": "kelvin-voigt"}
 # What `optimise_gains` finds for the case with payload feedback; a slow test asks it again.
 GAINS = {"A": 1.0, "a": 98.31, "a1": 156.6, "a2": 1993.0}
 
@@ -90,7 +92,7 @@ LIMITS: Mapping[str, tuple[Mapping[str, object], Maker]] = {
 def runs_of(name: str, seeds: int | Sequence[int]) -> sh.Runs:
     """Return the runs of a row's controller, with their traces."""
     changes, maker = {**CONTROLLERS, **LIMITS}[name]
-    case = sh.load_case("landing").replace(dict(changes))
+    case = sh.load_case("landing").replace({**LAW, **changes})
     return sh.simulate(case, maker(case), scenario="landing", seeds=seeds)
 
 
@@ -246,7 +248,8 @@ waves of 10 s; its positioning is wanted within 4 cm. The job is that of a crane
 University of Agder (MAS409); vessel, rope and winch are ours, and so is what is measured:
 the payload's motion up to 20 Hz, 20 ms late and with noise; the hook's by a motion reference
 unit (MRU) of 5 cm. The scenario holds the module 7.5 m above the seabed for a minute,
-lowers it to 5 m, holds it for another minute and sets it down.
+lowers it to 5 m, holds it for another minute and sets it down. The rope's damping is Kelvin and
+Voigt's here (`rope.damping_law`).
 
 ```python
 import stillhook as sh

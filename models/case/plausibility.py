@@ -122,6 +122,14 @@ def changed_meanings(case: Contents) -> Iterator[Finding]:
                 f"is not given: noise of {', '.join(noisy)} now passes the low-pass of its sensor "
                 "(`before-filter`); it was added behind it (`after-filter`) before",
             )
+    rope = case.rope
+    if rope.damping_ratio > 0.0 and "damping_law" not in rope.model_fields_set:
+        yield (
+            "rope.damping_law",
+            f"is not given: {rope.damping_ratio:g} is now the fraction in every mode of the rope "
+            "(`hysteretic`), and a design holds with less of it too; it rose with a mode's "
+            "frequency (`kelvin-voigt`) before",
+        )
     motor = case.winch.motor
     if isinstance(motor, ACMotor) and "kind" not in motor.model_fields_set:
         yield (

@@ -56,13 +56,14 @@ class Rope(Section):
     payload drag that is `stochastic`; a coefficient that the case gives stands for both."""
     damping_ratio: Annotated[float, Quantity("ratio", 0.0, 0.5)] = 0.002
     """Internal damping as a fraction of critical at the first axial mode."""
-    damping_law: Literal["hysteretic", "kelvin-voigt"] = "kelvin-voigt"
+    damping_law: Literal["hysteretic", "kelvin-voigt"] = "hysteretic"
     """How damping depends on frequency: `hysteretic`, about the same fraction in all modes, as of
-    wire rope; or `kelvin-voigt`, a fraction that rises in proportion to a mode's frequency."""
+    wire rope, and a design holds with less of it too; or `kelvin-voigt`, a fraction that rises in
+    proportion to a mode's frequency, which flatters the higher ones: an exhibit."""
     damping_measured: tuple[_Ratio, _Ratio] | None = None
     """Lowest and highest damping ratio of the first axial mode, where it was measured. A design
-    holds at the lowest too; without a measurement at a tenth of `damping_ratio`, but at no less
-    than solid steel has, 0.0002."""
+    of a hysteretic rope holds at the lowest too; without a measurement at a tenth of
+    `damping_ratio`, but at no less than solid steel has, 0.0002."""
     masses: Annotated[int | Literal["auto"], Quantity("count", 1, 40, word="auto")] = "auto"
     """Number of lumped masses that stand for the rope; `auto` takes as many as the bandwidth
     of the loop needs."""

@@ -122,7 +122,7 @@ def test_asking_for_a_row_that_is_not_there(rows):
 
 @pytest.mark.slow
 def test_the_gains_are_the_optimum_and_the_margins_what_the_page_says():
-    case = sh.load_case("landing")
+    case = sh.load_case("landing").replace(landing.LAW)
     design = sh.optimise_gains(case, "payload-feedback")
     assert dict(design.gains) == pytest.approx(landing.GAINS, rel=2e-3)
     assert "max_sensitivity, gain_margin_down bind" in design.status

@@ -377,6 +377,23 @@ def test_a_stored_case_keeps_the_meaning_that_it_had():
     assert Case.from_stored(load_case("subsea-crane").to_dict()).limits.tension_ends == "both"
 
 
+def test_a_rope_is_hysteretic_unless_told_otherwise_and_a_stored_one_is_what_it_was(tmp_path):
+    data = load_case("subsea-crane").to_dict()
+    del data["rope"]["damping_law"]
+    assert Case.from_dict(data).rope.damping_law == "hysteretic"
+    assert Case.from_stored(data).rope.damping_law == "kelvin-voigt"
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml_text(data), encoding="utf-8")
+    with pytest.warns(
+        PhysicsWarning, match=r"rope\.damping_law: is not given: 0\.002 is now"
+    ) as seen:
+        load_case(path)
+    assert len(seen) == 1
+    data["rope"]["damping_ratio"] = 0.0  # nothing that a law is about
+    path.write_text(yaml_text(data), encoding="utf-8")
+    load_case(path)
+
+
 def test_a_file_whose_least_tension_has_a_new_meaning_says_so(tmp_path):
     data = load_case("subsea-crane").to_dict()
     data["limits"]["minimum_tension"] = 42e3

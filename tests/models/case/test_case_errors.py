@@ -27,6 +27,7 @@ CASE = textwrap.dedent(
       axial_stiffness: 242.8 MN
       mass_per_length: 13.23 kg/m
       length: 1000 m
+      damping_law: hysteretic
     payload:
       mass: 50 t
       added_mass: 50 t
@@ -91,17 +92,17 @@ WRONG = {
     ),
     "kilonewtons as knots": (
         ("421.7 kN", "421.7 kn"),
-        "my.yaml:21: payload.submerged_weight: must be a force in [1, 1e+09] N, got '421.7 kn', "
+        "my.yaml:22: payload.submerged_weight: must be a force in [1, 1e+09] N, got '421.7 kn', "
         "which is a speed (kn is knots; did you mean kN?)",
     ),
     "metric tonnes": (
         ("  mass: 50 t", "  mass: 50 mt"),
-        "my.yaml:17: payload.mass: must be a mass in [1, 1e+08] kg, got '50 mt': mt is ambiguous "
+        "my.yaml:18: payload.mass: must be a mass in [1, 1e+08] kg, got '50 mt': mt is ambiguous "
         "(metric tonne, millitonne or megatonne?); write t for 1000 kg",
     ),
     "negative mass": (
         ("  mass: 50 t", "  mass: -5 t"),
-        "my.yaml:17: payload.mass: must be a mass in [1, 1e+08] kg, got '-5 t' (-5000 kg)",
+        "my.yaml:18: payload.mass: must be a mass in [1, 1e+08] kg, got '-5 t' (-5000 kg)",
     ),
     "zero peak period": (
         ("peak_period: 9 s", "peak_period: 0"),
@@ -118,11 +119,11 @@ WRONG = {
     ),
     "yes and no": (
         ("area: 16 m2", "area: true"),
-        "my.yaml:19: payload.area: must be an area in [0, 10000] m2, got True",
+        "my.yaml:20: payload.area: must be an area in [0, 10000] m2, got True",
     ),
     "empty value": (
         ("ratio: 100", "ratio:"),
-        "my.yaml:28: winch.gearbox.ratio: must be a ratio in [0.1, 10000], got nothing",
+        "my.yaml:29: winch.gearbox.ratio: must be a ratio in [0.1, 10000], got nothing",
     ),
     "unknown key": (
         ("diameter: 50 mm", "diameter: 50 mm\n  mases: 3"),
@@ -130,7 +131,7 @@ WRONG = {
     ),
     "unknown key, nothing near": (
         ("radius: 1 m", "radius: 1 m\n    colour: red"),
-        "my.yaml:27: winch.drum.colour: unknown key; known here: radius, layers, geometry, "
+        "my.yaml:28: winch.drum.colour: unknown key; known here: radius, layers, geometry, "
         "rope_on_drum_total, inertia",
     ),
     "unknown section": (
@@ -144,7 +145,7 @@ WRONG = {
     ),
     "unknown key in a motor": (
         ("type: ac", "type: ac\n    resistance: 3"),
-        "my.yaml:32: winch.motor.resistance: unknown key; known here: inertia, "
+        "my.yaml:33: winch.motor.resistance: unknown key; known here: inertia, "
         "viscous_friction, coulomb_friction, friction_speed, thermal_time_constant, "
         "temperature_rise, type, torque_bandwidth, speed_gain, base_speed, maximum_speed, kind",
     ),
@@ -154,42 +155,42 @@ WRONG = {
     ),
     "missing section": (
         ("  gearbox:\n    ratio: 100\n    efficiency: 0.925\n", ""),
-        "my.yaml:24: winch.gearbox: is missing",
+        "my.yaml:25: winch.gearbox: is missing",
     ),
     "missing motor": (
         (CASE[CASE.index("  motor:") : CASE.index("  drive:")], ""),
-        "my.yaml:24: winch.motor: is missing; its type must be 'dc' or 'ac'",
+        "my.yaml:25: winch.motor: is missing; its type must be 'dc' or 'ac'",
     ),
     "missing field in a motor": (
         ("    inertia: 20 kg m2\n", ""),
-        "my.yaml:30: winch.motor.inertia: is missing; it must be a moment of inertia in "
+        "my.yaml:31: winch.motor.inertia: is missing; it must be a moment of inertia in "
         "(0, 1e+06] kg m2",
     ),
     "bad field in a motor": (
         ("inertia: 20 kg m2", "inertia: 0"),
-        "my.yaml:33: winch.motor.inertia: must be a moment of inertia in (0, 1e+06] kg m2, got 0",
+        "my.yaml:34: winch.motor.inertia: must be a moment of inertia in (0, 1e+06] kg m2, got 0",
     ),
     "unknown motor": (
         ("type: ac", "type: hydraulic"),
-        "my.yaml:31: winch.motor.type: must be 'dc' or 'ac', got 'hydraulic'",
+        "my.yaml:32: winch.motor.type: must be 'dc' or 'ac', got 'hydraulic'",
     ),
     "no motor type": (
         ("    type: ac\n", ""),
-        "my.yaml:30: winch.motor.type: is missing; must be 'dc' or 'ac'",
+        "my.yaml:31: winch.motor.type: is missing; must be 'dc' or 'ac'",
     ),
     "unknown drag method": (
         ("method: stochastic", "method: linear"),
-        "my.yaml:23: payload.drag.method: must be 'given' or 'energy' or 'stochastic', "
+        "my.yaml:24: payload.drag.method: must be 'given' or 'energy' or 'stochastic', "
         "got 'linear'",
     ),
     "bad drag coefficient": (
         ("method: stochastic", "method: given\n    coefficient: 5 N/m"),
-        "my.yaml:24: payload.drag.coefficient: must be a damping in [0, 1e+09] N s/m, "
+        "my.yaml:25: payload.drag.coefficient: must be a damping in [0, 1e+09] N s/m, "
         "got '5 N/m', which is a force per length or a stiffness",
     ),
     "a section that is a number": (
         ("  drum:\n    radius: 1 m\n", "  drum: 1 m\n"),
-        "my.yaml:25: winch.drum: must be a section with keys of its own, got '1 m'",
+        "my.yaml:26: winch.drum: must be a section with keys of its own, got '1 m'",
     ),
     "a number that is a section": (
         ("  length: 1000 m", "  length: {value: 1000 m}"),
@@ -245,13 +246,13 @@ WRONG = {
     ),
     "continuous torque below the static load": (
         ("torque_continuous: 8 kN m", "torque_continuous: 4 kN m"),
-        "my.yaml:38: winch.drive.torque_continuous: must be at least the static motor torque, "
+        "my.yaml:39: winch.drive.torque_continuous: must be at least the static motor torque, "
         "5.778 kN m (rope tension 534.5 kN on a drum radius of 1 m through a gear of 100 and "
         "efficiency 0.925), got 4 kN m",
     ),
     "more rope paid out than there is": (
         ("radius: 1 m", "layers: american-hoist-1000\n    rope_on_drum_total: 800 m"),
-        "my.yaml:25: winch.drum: the drum holds 800 m of rope, less than the 1000 m paid out",
+        "my.yaml:26: winch.drum: the drum holds 800 m of rope, less than the 1000 m paid out",
     ),
     "tension limit below the static load": (
         ("sea:", "limits: {rope_tension_peak: 500 kN}\nsea:"),
@@ -304,8 +305,8 @@ def test_every_error_at_once_in_the_order_of_the_file(check):
         "my.yaml:7: sea.peak_period",
         "my.yaml:13: rope.diameter",
         "my.yaml:14: rope.colour",
-        "my.yaml:18: payload.mass",
-        "my.yaml:33: winch.motor.speed_gain",
+        "my.yaml:19: payload.mass",
+        "my.yaml:34: winch.motor.speed_gain",
     ]
 
 
@@ -324,7 +325,7 @@ def test_several_findings_of_one_section(check):
 def test_both_ratings_below_the_static_load(check):
     lines = check(("8 kN m", "4 kN m"), ("14.4 kN m", "5 kN m"))
     assert len(lines) == 2
-    assert lines[1].startswith("my.yaml:39: winch.drive.torque_peak: must be at least the static")
+    assert lines[1].startswith("my.yaml:40: winch.drive.torque_peak: must be at least the static")
     assert lines[1].endswith("got 5 kN m")
 
 

@@ -14,6 +14,8 @@ from stillhook.cli import COMMANDS, build_parser, main
 
 GAINS = "A=1,a=16,a1=44,a2=6.4"
 CALM = ("subsea-crane", "--set", "sea.significant_height=1")
+# What the gains were made for.
+CALM += ("--set", "rope.damping_law=kelvin-voigt")
 
 
 @pytest.fixture(autouse=True)
