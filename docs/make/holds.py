@@ -91,7 +91,7 @@ SIGNALS: Mapping[str, tuple[str, str, str]] = {
 FIGURES = ("sigma", "found", "error", "up", "ups", "down", "downs")
 POWER = ("power.up", "power.ups")
 REMNANT = "drive.set_point"  # where a design hears the noise of losses that switch
-KEYS = ("question", "case", "depth", "mass", "delay", "H_s", "T_p", "structure")
+KEYS = ("question", "case", "law", "depth", "mass", "delay", "H_s", "T_p", "structure")
 COLUMNS = (
     *KEYS,
     "ok",
@@ -369,6 +369,7 @@ class Bench:
 
 def _key_of(case: Case) -> Row:
     return {
+        "law": case.rope.damping_law,
         "depth": f"{case.rope.length:.5g}",
         "mass": f"{case.payload.mass:.5g}",
         "delay": f"{case.sensors.telemetry.delay + case.winch.drive.command_delay:.4g}",
