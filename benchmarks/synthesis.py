@@ -40,8 +40,9 @@ FloatArray = npt.NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[1]
 CASE = "subsea-crane"
-#: Peers know no friction of losses that switch, nor their noise: all solve the question without.
-PLAIN = {"winch.losses": "hauling"}
+#: Peers know no friction of losses that switch, nor their noise, nor the family of a hysteretic
+#: rope: all solve the question without.
+PLAIN = {"winch.losses": "hauling", "rope.damping_law": "kelvin-voigt"}
 #: Ends of the box that differential evolution searches: both signs of what has no sign of its own,
 #: three to fifteen times the optimum; what lies between two numbers, between these.
 BOXES: Mapping[str, FloatArray] = {
