@@ -349,12 +349,20 @@ def _status(ok: bool, members: Sequence[Tuning], family: FamilyProblem) -> str:
         return f"optimal{several} within the limits; {bind}"
     if not all(member.assessment and member.assessment.stable for member in members):
         return "the search ended at an unstable loop"
+    broken = sorted(
+        (
+            (u, name)
+            for name, member in zip(names, members, strict=True)
+            for u in member.limits.values()
+            if not u.kept
+        ),
+        key=lambda seen: seen[0].use,
+    )
+    worst = {u.name: (u, name) for u, name in broken}  # of a limit that several break, the worst
     values = [
         f"{u.name} at {_apart(u.value, u.bound)} instead of {_apart(u.bound, u.value)}"
         + (f" ({name})" if several else "")
-        for name, member in zip(names, members, strict=True)
-        for u in member.limits.values()
-        if not u.kept
+        for u, name in worst.values()
     ]
     if not values:
         return "the solver did not converge"
