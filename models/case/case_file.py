@@ -6,8 +6,6 @@ YAML is read as version 1.2; JSON is a part of it.  TOML goes through the same m
 name the field alone, as the standard library does not say in which line a value stood.
 """
 
-from __future__ import annotations
-
 import tomllib
 import warnings
 from collections.abc import Mapping

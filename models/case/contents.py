@@ -1,7 +1,5 @@
 """Contents of a case: its sections, and the statics that follow from several of them."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal
 

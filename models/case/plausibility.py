@@ -4,8 +4,6 @@ The static load comes first: a drive whose rating lies below it can hold nothing
 will change that.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -5,8 +5,6 @@ that the rope hangs from, the slings below it, between hook block and payload.  
 them as one stiffness, 1/K = 1/k_crane + 1/k_rope + 1/k_slings; here they are members of the chain.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

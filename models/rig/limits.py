@@ -1,7 +1,5 @@
 """Limits of the design, and the gains, as sections of the case file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Annotated, Literal

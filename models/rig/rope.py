@@ -4,8 +4,6 @@ A section holds what the file says; everything derived is a property beside it, 
 field changes all that hangs on it.  The formulas are those of the 1975 thesis, eq. 1.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Annotated, Literal

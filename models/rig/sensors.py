@@ -7,8 +7,6 @@ reference unit, motor encoder and load cell: payload feedback does not use those
 constant tension do.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal

@@ -6,8 +6,6 @@ entry (`drag_shape: disc`, `layers: american-hoist-1000`, `shape: {prism_side, p
 or gives figures of its own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -11,8 +11,6 @@ from a table (pitch diameter, and rope on the drum up to that layer) or from the
 a fixed `radius` overrides both.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator
@@ -181,10 +179,7 @@ class DrumGeometry(Section):
     def table(self, rope_diameter: float) -> tuple[DrumLayer, ...]:
         """Return the layers for a rope diameter [m], from the bare drum outwards.
 
-        Raises
-        ------
-        InputError
-            If the rope is wider than the drum.
+        Raises InputError if the rope is wider than the drum.
         """
         wraps = self.wraps or math.floor(self.width / rope_diameter * (1.0 + 1e-12))
         if wraps < 1:
@@ -292,10 +287,7 @@ class Drum(Section):
         The innermost layer holds from there to the end of the rope, every other one to the
         start of the one before it.
 
-        Raises
-        ------
-        InputError
-            If more rope is on the drum than its layers hold.
+        Raises InputError if more rope is on the drum than its layers hold.
         """
         if self.radius is not None:
             return ((0.0, self.radius),)

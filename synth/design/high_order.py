@@ -7,8 +7,6 @@ The convex programme behind knows one drag, peaks by a period that is guessed, a
 what its loop makes of them is measured, and asked of the next one, until all limits are kept.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -5,8 +5,6 @@ within the limits: the limits that bind there are the ones that break first.  Th
 the sea asked for and looks for the least factor on just those limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -26,23 +24,12 @@ _KEPT = 1e-4  # relative excess over a limit that a polished answer may have
 
 @dataclass(frozen=True, kw_only=True)
 class Shortfall:
-    """What a drive that is too small can do.
+    """What a drive that is too small can do."""
 
-    Attributes
-    ----------
-    share
-        Largest feasible significant height over the one asked for.
-    values
-        The searched parameters there.
-    breaks_first
-        Name of the drive limit that binds there at the highest price.
-    required
-        What each binding drive limit would have to be in the sea asked for.
-    """
-
-    share: float
-    values: Sequence[float]
-    breaks_first: str
+    share: float  #: Largest feasible significant height over the one asked for.
+    values: Sequence[float]  #: The searched parameters there.
+    breaks_first: str  #: Name of the drive limit that binds there at the highest price.
+    #: What each binding drive limit would have to be in the sea asked for.
     required: Mapping[str, float]
 
 

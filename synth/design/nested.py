@@ -9,8 +9,6 @@ an end), rolled-off feedback in that with a notch or (nearly) integral action an
 controller of order two or more, and feed-forward and drum feedback in both combined.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

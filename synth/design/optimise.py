@@ -8,8 +8,6 @@ the largest sea that can, and the status names the limit that breaks first and w
 have to be.  A design that fails its independent check is not ok, whatever the search said.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial

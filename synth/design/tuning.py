@@ -29,28 +29,18 @@ from ..verify import Verification, verify_tuning
 
 @dataclass(frozen=True, kw_only=True)
 class LimitUse:
-    """How a design uses one limit.
-
-    Attributes
-    ----------
-    value, bound
-        In `unit`.
-    use
-        Share of the limit that is used; above 1 it is broken.
-    price
-        What the cost (in its own unit) would fall by if the bound were one percent looser; 0
-        where the limit does not bind.
-    enforced
-        Whether the optimiser had to keep it.
-    """
+    """How a design uses one limit."""
 
     name: str
+    #: In `unit`.
     value: float
     bound: float
-    use: float
+    use: float  #: Share of the limit that is used; above 1 it is broken.
+    #: What the cost (in its own unit) would fall by if the bound were one percent looser; 0 where
+    #: the limit does not bind.
     price: float = 0.0
     unit: str = ""
-    enforced: bool = True
+    enforced: bool = True  #: Whether the optimiser had to keep it.
 
     @property
     def kept(self) -> bool:
@@ -71,53 +61,27 @@ class LqgFigure:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tuning:
-    """The answer of `tune`, with the question it answers.
-
-    Attributes
-    ----------
-    ok
-        Stable, all limits kept, converged and checked.
-    status
-        The sentence for the user.
-    cost
-        Square root of the weighted variance, in the unit of the outputs.
-    parameters
-        Parameters of the structure by name, those that were fixed among them.
-    controller
-        The controller in state space, u = +C y.
-    margins
-        Stability margins, refined (`synth.loop.margins`).
-    limits
-        Use of each limit by name.
-    starts
-        All starts of the search.
-    agreed
-        How many starts ended within 1e-4 of the best cost.
-    assessment
-        The closed loop in numbers; None if no stable one was found.
-    found
-        The search's raw answer.
-    coefficients
-        Those of the problem's elements that agree with the response: of the drag [N s/m], if drag
-        was asked for.
-    members
-        The same controller on each further plant that it was tuned for.
-    """
+    """The answer of `tune`, with the question it answers."""
 
     problem: Problem
-    ok: bool
-    status: str
-    cost: float
+    ok: bool  #: Stable, all limits kept, converged and checked.
+    status: str  #: The sentence for the user.
+    cost: float  #: Square root of the weighted variance, in the unit of the outputs.
+    #: Parameters of the structure by name, those that were fixed among them.
     parameters: Mapping[str, float]
-    controller: LinearController | None
-    margins: Margins | None
-    limits: Mapping[str, LimitUse]
-    starts: tuple[Start, ...] = ()
-    agreed: int = 0
+    controller: LinearController | None  #: The controller in state space, u = +C y.
+    margins: Margins | None  #: Stability margins, refined (`synth.loop.margins`).
+    limits: Mapping[str, LimitUse]  #: Use of each limit by name.
+    starts: tuple[Start, ...] = ()  #: All starts of the search.
+    agreed: int = 0  #: How many starts ended within 1e-4 of the best cost.
+    #: Those of the problem's elements that agree with the response: of the drag [N s/m], if drag
+    #: was asked for.
     coefficients: tuple[float, ...] = ()
+    #: The same controller on each further plant that it was tuned for.
     members: tuple[Tuning, ...] = ()
+    #: The closed loop in numbers; None if no stable one was found.
     assessment: Assessment | None = field(repr=False)
-    found: Found = field(repr=False)
+    found: Found = field(repr=False)  #: The search's raw answer.
 
     @cached_property
     def lqg(self) -> LqgFigure:

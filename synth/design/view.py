@@ -48,26 +48,14 @@ class Look(Design):
     """What given parameters do, at a glance: a design with its curves, not verified.
 
     The curves are those of the case; its further `members` are looks with their own.
-
-    Attributes
-    ----------
-    growth
-        Largest real part of a pole, with the drag before compensation [1/s].
-    omega
-        Frequencies of the curves [rad/s], (k,); none where the loop is not stable.
-    response
-        P/Z, payload over hook, (k,).
-    spectrum
-        One-sided density of the payload's motion [m2 s/rad], (k,).
-    loop_gain
-        L of the loop broken at the command (the Nyquist curve), (k,).
     """
 
-    growth: float
+    growth: float  #: Largest real part of a pole, with the drag before compensation [1/s].
+    #: Frequencies of the curves [rad/s], (k,); none where the loop is not stable.
     omega: FloatArray
-    response: ComplexArray
-    spectrum: FloatArray
-    loop_gain: ComplexArray
+    response: ComplexArray  #: P/Z, payload over hook, (k,).
+    spectrum: FloatArray  #: One-sided density of the payload's motion [m2 s/rad], (k,).
+    loop_gain: ComplexArray  #: L of the loop broken at the command (the Nyquist curve), (k,).
 
     @property
     def stable(self) -> bool:

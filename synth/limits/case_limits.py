@@ -1,7 +1,5 @@
 """The limits that a case states: on the loop, and on motor, drive and rope."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -50,10 +48,7 @@ def loop_limits(case: Case, data: PlantData, masses: int) -> tuple[Limit, ...]:
 def drive_limits(case: Case, plant: LinearPlant) -> tuple[Limit, ...]:
     """Return the limits on motor, drive and rope.
 
-    Raises
-    ------
-    InputError
-        If they are to be enforced and the load at rest breaks one already.
+    Raises InputError if they are to be enforced and the load at rest breaks one already.
     """
     drive, wanted = case.winch.drive, case.limits
     static, loss = plant.static, plant.loss

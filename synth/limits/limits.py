@@ -80,18 +80,10 @@ class Symbols(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Limit(ABC):
-    """A bound on something that a design does.
+    """A bound on something that a design does."""
 
-    Parameters
-    ----------
-    bound
-        The value that may not be exceeded (or, where `at_least` is true, undercut).
-    name
-        How reports call it; each kind has a default.
-    """
-
-    bound: float
-    name: str = ""
+    bound: float  #: The value that may not be exceeded (or, where `at_least` is true, undercut).
+    name: str = ""  #: How reports call it; each kind has a default.
     unit: str = ""
 
     at_least: ClassVar[bool] = False

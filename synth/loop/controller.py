@@ -46,23 +46,15 @@ class StateSpace(Protocol):
 class LinearController:
     """A controller x' = A x + B y, u = C x + D y.
 
-    Parameters
-    ----------
-    A, B, C, D
-        Matrices, (n, n), (n, ny), (nu, n), (nu, ny); n may be 0.
-    measurements, inputs
-        Names of y (what the controller hears) and u (what it commands).
-
-    Raises
-    ------
-    InputError
-        If the shapes disagree or a number is not finite.
+    Raises InputError if the shapes disagree or a number is not finite.
     """
 
+    #: Matrices, (n, n), (n, ny), (nu, n), (nu, ny); n may be 0.
     A: FloatArray
     B: FloatArray
     C: FloatArray
     D: FloatArray
+    #: Names of y (what the controller hears) and u (what it commands).
     measurements: tuple[str, ...]
     inputs: tuple[str, ...]
 
@@ -94,10 +86,7 @@ class LinearController:
     def response_at(self, s: npt.ArrayLike) -> ComplexArray:
         """Return C(s) at points `s` [1/s], (k, nu, ny).
 
-        Raises
-        ------
-        InputError
-            If a point is a pole of the controller.
+        Raises InputError if a point is a pole of the controller.
         """
         found = self._transfer(np.asarray(s, dtype=np.complex128).reshape(-1))
         if found is None:

@@ -27,24 +27,17 @@ from models.plant import ShapingFilter
 
 @dataclass(frozen=True, kw_only=True)
 class Disturbance:
-    """One disturbance.
+    """One disturbance."""
 
-    Attributes
-    ----------
-    name, density
-        Its name, and its one-sided density per rad/s.
-    band, splits
-        The band that holds it [rad/s], None for the half line, and kinks in it [rad/s].
-    source, shares
-        Of an error that is in part a share of another disturbance, of signs that nobody knows: the
-        name of that one, and from frequencies (k,) [rad/s] to the shares, (e, k).  The density
-        holds them with the mean square over their signs.
-    """
-
+    #: Its name, and its one-sided density per rad/s.
     name: str
     density: Callable[[FloatArray], FloatArray]
+    #: The band that holds it [rad/s], None for the half line, and kinks in it [rad/s].
     band: tuple[float, float] | None
     splits: tuple[float, ...] = ()
+    #: Of an error that is in part a share of another disturbance, of signs that nobody knows: the
+    #: name of that one, and from frequencies (k,) [rad/s] to the shares, (e, k).  The density holds
+    #: them with the mean square over their signs.
     source: str = ""
     shares: Callable[[FloatArray], ComplexArray] | None = None
 
@@ -60,18 +53,12 @@ class Disturbance:
 
 @dataclass(frozen=True, kw_only=True)
 class CoherentError:
-    """What a pair of disturbances have in common, see `Disturbance.shares`.
+    """What a pair of disturbances have in common, see `Disturbance.shares`."""
 
-    Attributes
-    ----------
-    error, source
-        Places of the error and of what it is a share of.
-    shares
-        From frequencies (k,) [rad/s] to the shares, (e, k).
-    """
-
+    #: Places of the error and of what it is a share of.
     error: int
     source: int
+    #: From frequencies (k,) [rad/s] to the shares, (e, k).
     shares: Callable[[FloatArray], ComplexArray]
 
     @classmethod

@@ -12,8 +12,6 @@ the switch of a simulation is tanh(omega/omega_0), steepest at Delta/omega_0, an
 b = sqrt(2/pi) Delta / sqrt(sigma^2 + (2/pi) omega_0^2), omega_0 = 1 rad/s at the motor.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,20 +33,11 @@ _TURN = np.sqrt(2.0 / np.pi)  # of a motor's speed, over which a loss changes it
 
 @dataclass(frozen=True, kw_only=True)
 class Element(ABC):
-    """Something of the plant as force = -c velocity, c by the velocity's standard deviation.
+    """Something of the plant as force = -c velocity, c by the velocity's standard deviation."""
 
-    Parameters
-    ----------
-    velocity
-        Name of the velocity among the plant's outputs.
-    force
-        Name of the force among the plant's disturbances.
-    reference
-        The coefficient that the plant already holds; the element adds c minus this.
-    """
-
-    velocity: str
-    force: str
+    velocity: str  #: Name of the velocity among the plant's outputs.
+    force: str  #: Name of the force among the plant's disturbances.
+    #: The coefficient that the plant already holds; the element adds c minus this.
     reference: float = 0.0
 
     #: Whether it is always there.  A loss counts for less the more the drum moves and is no damping
@@ -151,10 +140,8 @@ def with_elements(
 ) -> LinearPlant:
     """Return the plant with elements at their coefficients.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown or a velocity is no pure state of the plant (has a direct term).
+    Raises InputError if a name is unknown or a velocity is no pure state of the plant (has a direct
+    term).
     """
     for element, coefficient in zip(elements, coefficients, strict=True):
         if gain := element.reference - coefficient:

@@ -7,8 +7,6 @@ grid's spacing.  Evaluations are dear one by one and cheap together: all places 
 once, several nodes at a time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -33,33 +31,17 @@ _RESOLVED = 1e-11  # relative size of a polynomial's last terms where it is as g
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Margins:
-    """Margins of a stable loop; for several loops, of the worst one.
+    """Margins of a stable loop; for several loops, of the worst one."""
 
-    Attributes
-    ----------
-    max_sensitivity
-        M_s, the peak of |1/(1+L)|, at `peak` [rad/s].
-    gain
-        Factor by which the gain may grow; infinity if without bound.
-    gain_down
-        Factor to which the gain may fall; 0 if all the way.
-    phase
-        Phase margin, the least at any crossover [rad]; infinity without a crossover.
-    delay
-        Further delay that makes the loop unstable [s]; infinity without a crossover.
-    disk
-        Balanced disk margin alpha, 1/max|S - 1/2| (Seiler, Packard and Gahinet 2020, skew 0).
-    crossovers, real_axis_crossings
-        Where |L| = 1 and where L crosses the negative real axis [rad/s].
-    """
-
-    max_sensitivity: float
+    max_sensitivity: float  #: M_s, the peak of |1/(1+L)|, at `peak` [rad/s].
     peak: float
-    gain: float
-    gain_down: float
-    phase: float
-    delay: float
+    gain: float  #: Factor by which the gain may grow; infinity if without bound.
+    gain_down: float  #: Factor to which the gain may fall; 0 if all the way.
+    phase: float  #: Phase margin, the least at any crossover [rad]; infinity without a crossover.
+    delay: float  #: Further delay that makes the loop unstable [s]; infinity without a crossover.
+    #: Balanced disk margin alpha, 1/max|S - 1/2| (Seiler, Packard and Gahinet 2020, skew 0).
     disk: float
+    #: Where |L| = 1 and where L crosses the negative real axis [rad/s].
     crossovers: FloatArray
     real_axis_crossings: FloatArray
 

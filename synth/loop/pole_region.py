@@ -23,22 +23,14 @@ _AS_FAST = 0.8  # of the slowest model's pole: up to there a delay model is as g
 
 @dataclass(frozen=True, kw_only=True)
 class PoleRegion:
-    """The smallest region of the left half plane that holds a loop's poles.
+    """The smallest region of the left half plane that holds a loop's poles."""
 
-    Attributes
-    ----------
-    decay
-        Least decay rate, -Re s of the rightmost pole [1/s]; negative for an unstable loop.
-    damping
-        Least damping ratio, -Re s/|s| [-]; 1 where no pole swings, 0 or less on the axis and
-        beyond it.
-    frequency
-        Highest frequency, |s| of the fastest pole [rad/s].
-    """
-
+    #: Least decay rate, -Re s of the rightmost pole [1/s]; negative for an unstable loop.
     decay: float
+    #: Least damping ratio, -Re s/|s| [-]; 1 where no pole swings, 0 or less on the axis and beyond
+    #: it.
     damping: float
-    frequency: float
+    frequency: float  #: Highest frequency, |s| of the fastest pole [rad/s].
 
     @staticmethod
     def of(poles: ComplexArray, models: ComplexArray | None = None) -> PoleRegion:

@@ -90,25 +90,15 @@ class LoopBlocks:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Closing:
-    """What closes a loop: C at k points, the drag's loop in it, and its slopes.
+    """What closes a loop: C at k points, the drag's loop in it, and its slopes."""
 
-    Attributes
-    ----------
-    entries
-        The entries of C that are not zero, (..., k) each, by row and column.
-    size
-        Rows and columns of C, (m, l).
-    slopes
-        For each entry that depends on a variable which ones, (n,), and its slopes by them, (n, k);
-        None if none are asked for.
-    count
-        How many variables there are.
-    """
-
+    #: The entries of C that are not zero, (..., k) each, by row and column.
     entries: Mapping[tuple[int, int], ComplexArray]
-    size: tuple[int, int]
+    size: tuple[int, int]  #: Rows and columns of C, (m, l).
+    #: For each entry that depends on a variable which ones, (n,), and its slopes by them, (n, k);
+    #: None if none are asked for.
     slopes: Mapping[tuple[int, int], tuple[list[int], ComplexArray]] | None = None
-    count: int = 0
+    count: int = 0  #: How many variables there are.
 
     @classmethod
     def of(cls, controller: LinearController, s: ComplexArray) -> Closing:
@@ -136,23 +126,14 @@ class Closing:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Shaking:
-    """What shakes a loop at k points, times quadrature weights.
+    """What shakes a loop at k points, times quadrature weights."""
 
-    Attributes
-    ----------
-    weights
-        Of the density of each disturbance, (nw, k).
-    source, error, shares
-        Places of two disturbances that go together, and of their cross-densities, (e, k).
-    signs
-        Every combination of signs that these may have, (c, e).
-    """
-
-    weights: FloatArray
+    weights: FloatArray  #: Of the density of each disturbance, (nw, k).
+    #: Places of two disturbances that go together, and of their cross-densities, (e, k).
     source: int
     error: int
     shares: ComplexArray
-    signs: FloatArray
+    signs: FloatArray  #: Every combination of signs that these may have, (c, e).
 
 
 class LoopResponses:

@@ -35,10 +35,7 @@ class Objective(Enum):
     def of(cls, name: str | Objective) -> Objective:
         """Return the objective of a name.
 
-        Raises
-        ------
-        InputError
-            If there is none of that name.
+        Raises InputError if there is none of that name.
         """
         if isinstance(name, Objective):
             return name
@@ -51,26 +48,13 @@ class Objective(Enum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FamilyLoop:
-    """One loop of a family.
+    """One loop of a family."""
 
-    Attributes
-    ----------
-    name
-        How reports call it.
-    problem
-        Its plant, disturbances and limits.
-    weight
-        Its occurrence; only ratios count.
-    best
-        The least cost that parameters of its own would reach, for the regret.
-    blend
-        Its parameters as a matrix times the searched ones, (own, searched); None: the same.
-    """
-
-    name: str
-    problem: Problem
-    weight: float = 1.0
-    best: float = 1.0
+    name: str  #: How reports call it.
+    problem: Problem  #: Its plant, disturbances and limits.
+    weight: float = 1.0  #: Its occurrence; only ratios count.
+    best: float = 1.0  #: The least cost that parameters of its own would reach, for the regret.
+    #: Its parameters as a matrix times the searched ones, (own, searched); None: the same.
     blend: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -87,23 +71,13 @@ class FamilyLoop:
 class FamilyProblem:
     """Scenarios with one set of searched parameters, and what is made small.
 
-    Parameters
-    ----------
-    scenarios
-        At least one.
-    objective
-        Worst cost, root of the occurrence-weighted mean square, or worst ratio to `best`.
-    parameters
-        The searched parameters; by default those of the first scenario's law.
-
-    Raises
-    ------
-    InputError
-        If there is no scenario, no weight, or the numbers of parameters disagree.
+    Raises InputError if there is no scenario, no weight, or the numbers of parameters disagree.
     """
 
-    scenarios: tuple[FamilyLoop, ...]
+    scenarios: tuple[FamilyLoop, ...]  #: At least one.
+    #: Worst cost, root of the occurrence-weighted mean square, or worst ratio to `best`.
     objective: Objective = Objective.WORST
+    #: The searched parameters; by default those of the first scenario's law.
     parameters: tuple[Parameter, ...] = ()
 
     def __post_init__(self) -> None:

@@ -92,26 +92,14 @@ class FamilyQuestion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PosedFamily:
-    """A case and changes of it with one structure, posed.
+    """A case and changes of it with one structure, posed."""
 
-    Attributes
-    ----------
-    questions
-        The question of each member, the case's own first.
-    names
-        What each member is called.
-    objective
-        What is made small over all of them.
-    given
-        How many of them were given: the first; the others are these with the least damping.
-    reserves
-        By member, what limits hold in reserve for the distributed rope, relative and by name.
-    """
-
-    questions: tuple[DesignQuestion, ...]
-    names: tuple[str, ...]
-    objective: Objective = Objective.WORST
+    questions: tuple[DesignQuestion, ...]  #: The question of each member, the case's own first.
+    names: tuple[str, ...]  #: What each member is called.
+    objective: Objective = Objective.WORST  #: What is made small over all of them.
+    #: How many of them were given: the first; the others are these with the least damping.
     given: int = 1
+    #: By member, what limits hold in reserve for the distributed rope, relative and by name.
     reserves: tuple[Mapping[str, float], ...] = ()
 
     @property

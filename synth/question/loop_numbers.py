@@ -53,20 +53,11 @@ _LEAST_CYCLES = float(np.exp(0.5))  # of a peak: a factor of one, below which th
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Point:
-    """A parameter vector, or many: what a loop is closed with.
+    """A parameter vector, or many: what a loop is closed with."""
 
-    Attributes
-    ----------
-    values
-        The law's parameters, one array each, () or (b, 1).
-    coefficients
-        One for each of the problem's elements, () or (b, 1).
-    slopes
-        Whether derivatives are asked for: by the parameters, then by the coefficients' logarithms.
-    """
-
-    values: Sequence[Any]
-    coefficients: Sequence[Any] = ()
+    values: Sequence[Any]  #: The law's parameters, one array each, () or (b, 1).
+    coefficients: Sequence[Any] = ()  #: One for each of the problem's elements, () or (b, 1).
+    #: Whether derivatives are asked for: by the parameters, then by the coefficients' logarithms.
     slopes: bool = False
 
     def closing(self, problem: Problem, s: ComplexArray, still: BoolArray | None = None) -> Closing:

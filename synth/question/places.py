@@ -6,8 +6,6 @@ looked for where interpolation says, a few calls with all places of all curves a
 `synth.loop.margins` finds the same places to the last digit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Sequence
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """The problem of synthesis: plant, structure, disturbances, weights and limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum

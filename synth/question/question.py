@@ -9,8 +9,6 @@ rope masses the plant has.  The sea, the error of the reference unit and the noi
 are disturbances in one cost, so that no gain grows without a price.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -91,23 +89,14 @@ class SampledNoise:
 
     Its variance is that of the samples, so that what a direct gain makes of it has one too, and a
     rate that goes with it.
-
-    Attributes
-    ----------
-    spectrum
-        Density per rad/s.
-    sample_time
-        Time between samples [s].
-    lowest, splits
-        Frequency below which there is nothing of it, if that is low, and kinks [rad/s].
-    source, shares
-        Of an error that is in part a share of a disturbance, see `synth.loop.Disturbance`.
     """
 
-    spectrum: Callable[[Any], Any]
-    sample_time: float = SAMPLE_TIME
+    spectrum: Callable[[Any], Any]  #: Density per rad/s.
+    sample_time: float = SAMPLE_TIME  #: Time between samples [s].
+    #: Frequency below which there is nothing of it, if that is low, and kinks [rad/s].
     lowest: float = math.inf
     splits: tuple[float, ...] = ()
+    #: Of an error that is in part a share of a disturbance, see `synth.loop.Disturbance`.
     source: str = ""
     shares: Callable[[FloatArray], ComplexArray] | None = None
 
@@ -123,44 +112,30 @@ class SampledNoise:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DesignQuestion:
-    """A case and a structure as synthesis sees them.
+    """A case and a structure as synthesis sees them."""
 
-    Attributes
-    ----------
-    case, structure
-        The case, and the structure whose parameters are asked for.
-    data, hook
-        The plant's numbers and the hook's motion.
-    model
-        The plant before it is linearised.
-    plant
-        The linear plant with what the structure hears, its drag that before compensation.
-    spectra
-        What shakes it, by name of the disturbance: the sea, the reference unit, the sensors.
-    loop, drive, reported
-        Limits of the loop, limits of the drive, and limits that are reported only.
-    elements
-        What is linearised with the response: quadratic drag, if no C is given, and losses that
-        switch with the motor's direction, if there are some.
-    drag_before, payload_rms_before
-        Linear drag [N s/m] and rms payload motion [m] with the drum held.
-    held
-        Parameters of the structure that are not searched, by name.
-    """
-
+    #: The case, and the structure whose parameters are asked for.
     case: Case
     structure: PayloadFeedback | WinchStructure | LowOrderFeedback
+    #: The plant's numbers and the hook's motion.
     data: PlantData
     hook: HookMotion
-    model: Plant
+    model: Plant  #: The plant before it is linearised.
+    #: The linear plant with what the structure hears, its drag that before compensation.
     plant: LinearPlant
+    #: What shakes it, by name of the disturbance: the sea, the reference unit, the sensors.
     spectra: Mapping[str, Any]
+    #: Limits of the loop, limits of the drive, and limits that are reported only.
     loop: tuple[Limit, ...]
     drive: tuple[Limit, ...]
     reported: tuple[Limit, ...]
+    #: What is linearised with the response: quadratic drag, if no C is given, and losses that
+    #: switch with the motor's direction, if there are some.
     elements: tuple[Element, ...]
+    #: Linear drag [N s/m] and rms payload motion [m] with the drum held.
     drag_before: float
     payload_rms_before: float
+    #: Parameters of the structure that are not searched, by name.
     held: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -384,10 +359,7 @@ def _same_sea(case: Case, other: Case) -> bool:
 def controller_for(case: Case, structure: str, parameters: Mapping[str, float]) -> LinearController:
     """Return the controller of a structure's parameters on a case.
 
-    Raises
-    ------
-    InputError
-        If there is no such structure.
+    Raises InputError if there is no such structure.
     """
     named = structure_named(structure, case)
     plant = sensed_plant(case, drag=case.payload.fixed_drag or 0.0)

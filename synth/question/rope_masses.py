@@ -6,8 +6,6 @@ then what is kept on the masses is broken on the rope.  Resonances of rope are n
 grid: they are looked for at the poles of the rope, with the loop open and closed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -70,28 +70,15 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Found:
-    """What a search found: the best answer, its assessments, and every start.
+    """What a search found: the best answer, its assessments, and every start."""
 
-    Attributes
-    ----------
-    solved
-        The best answer; None where nothing stable was found at all.
-    assessments
-        The loop of each member in numbers.
-    excess
-        The largest relative excess over a limit of any member.
-    starts, agreed
-        The starts, and how many of them arrived at the best answer.
-    reference
-        Parameters of briskly stable loops.
-    """
-
-    solved: Solution | None
-    assessments: tuple[Assessment, ...] = ()
-    excess: float = np.inf
+    solved: Solution | None  #: The best answer; None where nothing stable was found at all.
+    assessments: tuple[Assessment, ...] = ()  #: The loop of each member in numbers.
+    excess: float = np.inf  #: The largest relative excess over a limit of any member.
+    #: The starts, and how many of them arrived at the best answer.
     starts: tuple[Start, ...] = ()
     agreed: int = 0
-    reference: FloatArray | None = None
+    reference: FloatArray | None = None  #: Parameters of briskly stable loops.
 
     @property
     def assessment(self) -> Assessment | None:
@@ -382,10 +369,7 @@ def with_bests(
 ) -> FamilyProblem:
     """Return a family with the best cost of its own for each member, for the regret.
 
-    Raises
-    ------
-    InputError
-        If no parameters of its own keep a member's limits.
+    Raises InputError if no parameters of its own keep a member's limits.
     """
     scenarios = []
     for k, scenario in enumerate(family.scenarios):

@@ -1,7 +1,5 @@
 """Frequency nodes of a programme: quadrature for its variances, a grid for its margins."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

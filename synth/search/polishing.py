@@ -4,8 +4,6 @@ start -> nodes for its poles -> descent -> nodes for the new poles -> ... -> Sol
       -> margins where they are measured -> assessment -> excess over the limits
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

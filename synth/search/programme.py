@@ -20,8 +20,6 @@ polynomial (Lienard-Chipart), the usual way, lose their digits beyond order eigh
 brings twenty.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -65,35 +63,22 @@ Tighten = Mapping[tuple[int, str], float]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solution:
-    """What a solve returned; nothing in it is verified yet.
+    """What a solve returned; nothing in it is verified yet."""
 
-    Attributes
-    ----------
-    values
-        The searched parameters.
-    coefficients
-        Those of each member's elements: of drag [N s/m], of losses [N m s/rad].
-    objective
-        Logarithm of what the family's objective makes of the costs.
-    extra
-        The variable of a goal other than the cost.
-    prices
-        d log(cost) / d log(bound) by member and limit, with the sign of the bound: what loosening
-        takes off counts as negative.
-    costs, pressure
-        Cost of each member on the nodes, and how much of the objective hangs on it (adds up to 1).
-    """
-
-    values: FloatArray
+    values: FloatArray  #: The searched parameters.
+    #: Those of each member's elements: of drag [N s/m], of losses [N m s/rad].
     coefficients: tuple[tuple[float, ...], ...]
-    objective: float
+    objective: float  #: Logarithm of what the family's objective makes of the costs.
     converged: bool
     message: str
     iterations: int
+    #: d log(cost) / d log(bound) by member and limit, with the sign of the bound: what loosening
+    #: takes off counts as negative.
     prices: tuple[Mapping[str, float], ...]
+    #: Cost of each member on the nodes, and how much of the objective hangs on it (adds up to 1).
     costs: FloatArray
     pressure: FloatArray
-    extra: float = 0.0
+    extra: float = 0.0  #: The variable of a goal other than the cost.
 
     @property
     def coefficient(self) -> tuple[float, ...]:

@@ -14,8 +14,6 @@ out of the quadratic programme, which DAQP solves by a dual active set.  Points 
 unstable are never evaluated: a spectral integral is finite there too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

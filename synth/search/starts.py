@@ -7,8 +7,6 @@ stable candidates, ranked by cost and broken limits, all of them at once, and sp
 where too few are stable, moves the least unstable ones left by minimising their spectral abscissa.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any

@@ -11,8 +11,6 @@ that runs or checks the controller (`matrices`, a state-space form) follow from 
 * `lead_time`: (1 + tau s) / (1 + s/w), static gain 1
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -32,20 +30,12 @@ Fraction = Callable[..., tuple[Any, Sequence[Any], Sequence[Any]]]
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSection:
-    """A transfer function with parameters.
+    """A transfer function with parameters."""
 
-    Parameters
-    ----------
-    name
-        What its parameters' names begin with: a corner becomes ``<name>.corner``.
-    ranges
-        Bounds and unit of each parameter, in the order in which the methods take their values.
-    fraction
-        From the values to w [rad/s], and N and D by rising powers of s/w; D is without its last, 1.
-    """
-
-    name: str
+    name: str  #: What its parameters' names begin with: a corner becomes ``<name>.corner``.
+    #: Bounds and unit of each parameter, in the order in which the methods take their values.
     ranges: Mapping[str, tuple[float, float, str]]
+    #: From the values to w [rad/s], and N and D by rising powers of s/w; D is without its last, 1.
     fraction: Fraction
 
     @property

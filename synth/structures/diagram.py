@@ -12,8 +12,6 @@ moves).  `DiagramLaw` makes of the branches what the search wants of any structu
 state space.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -58,37 +58,18 @@ _MARGIN = 2.0  # gain margin that is checked [-]
 
 @dataclass(frozen=True, kw_only=True)
 class SteadyMotion:
-    """The motor as the controllers see it: J w' = kappa (u - u_static) - D w.
+    """The motor as the controllers see it: J w' = kappa (u - u_static) - D w."""
 
-    Attributes
-    ----------
-    inertia
-        J at the motor's shaft, the load not included [kg m2].
-    torque_gain
-        kappa [N m per unit of the command].
-    damping
-        D [N m s/rad].
-    own_gain
-        How much of the motor's speed the motor itself takes from the command: K_omega [V s/rad]
-        of a DC motor, 1 of a regulated AC motor, 0.
-    regulated
-        Whether the drive has a speed regulator of its own: its command is a speed.
-    lag
-        Time in which the torque builds up [s].
-    command_delay
-        Delay of the command [s].
-    per_rope_speed
-        Motor speed per speed of the rope, n/r [rad/m].
-    """
-
-    inertia: float
-    torque_gain: float
-    damping: float
+    inertia: float  #: J at the motor's shaft, the load not included [kg m2].
+    torque_gain: float  #: kappa [N m per unit of the command].
+    damping: float  #: D [N m s/rad].
+    #: How much of the motor's speed the motor itself takes from the command: K_omega [V s/rad] of a
+    #: DC motor, 1 of a regulated AC motor, 0.
     own_gain: float
-    regulated: bool
-    lag: float
-    command_delay: float
-    per_rope_speed: float
+    regulated: bool  #: Whether the drive has a speed regulator of its own: its command is a speed.
+    lag: float  #: Time in which the torque builds up [s].
+    command_delay: float  #: Delay of the command [s].
+    per_rope_speed: float  #: Motor speed per speed of the rope, n/r [rad/m].
 
     @classmethod
     def of(cls, data: PlantData) -> SteadyMotion:
@@ -126,34 +107,17 @@ class SteadyMotion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrumSpeedLoop:
-    """The drum-speed loop of a case; `from_case` makes it.
+    """The drum-speed loop of a case; `from_case` makes it."""
 
-    Attributes
-    ----------
-    motor
-        The motor's numbers.
-    static
-        Command that holds the load.
-    proportional, integral
-        Kp [command s/rad], Ki [command/rad].
-    bandwidth
-        omega_b [rad/s].
-    tracking
-        Rate at which the integral follows a drive that does not obey [1/s].
-    speed_limit
-        Highest motor speed that is asked for [rad/s].
-    sample_time
-        T [s].
-    """
-
-    motor: SteadyMotion
-    static: float
+    motor: SteadyMotion  #: The motor's numbers.
+    static: float  #: Command that holds the load.
+    #: Kp [command s/rad], Ki [command/rad].
     proportional: float
     integral: float
-    bandwidth: float
-    tracking: float
-    speed_limit: float
-    sample_time: float
+    bandwidth: float  #: omega_b [rad/s].
+    tracking: float  #: Rate at which the integral follows a drive that does not obey [1/s].
+    speed_limit: float  #: Highest motor speed that is asked for [rad/s].
+    sample_time: float  #: T [s].
 
     @classmethod
     def from_case(

@@ -1,7 +1,5 @@
 """A structure some of whose parameters are held: `Fixed`, what `tune(..., fixed=...)` searches."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,18 +16,10 @@ from .structure import GeneralisedPlant, ParametrisedController, Structure
 
 @dataclass(frozen=True, kw_only=True)
 class Fixed(Structure):
-    """A structure with some of its parameters held at given values.
+    """A structure with some of its parameters held at given values."""
 
-    Parameters
-    ----------
-    structure
-        The structure.
-    values
-        The values held, by name of a parameter.
-    """
-
-    structure: Structure
-    values: Mapping[str, float]
+    structure: Structure  #: The structure.
+    values: Mapping[str, float]  #: The values held, by name of a parameter.
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law; see `Structure.bind`.

@@ -21,8 +21,6 @@ ordinary point.  Complex and real poles meet within a block without a singularit
 that repeats across blocks is out of reach, which nothing that is optimised asks for.
 """
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
@@ -77,25 +75,15 @@ class LowOrder(Structure):
 
     Noise on every measurement and a weight on every input (or a limit that does as much) belong
     to the question: without them the best controller has an infinite gain.
-
-    Parameters
-    ----------
-    order
-        Number of states n, at least 1.
-    proper
-        Whether there is a direct term D; strictly proper if not.
-    stable
-        Whether the controller itself must be stable.
-    bounds
-        Bounds by parameter name.  Block k has ``alpha0[k]``, ``alpha1[k]`` (its poles are the
-        roots of s^2 + alpha1 s + alpha0), ``B[k.1,y]``, ``B[k.2,y]`` and ``C[u,k.1]``,
-        ``C[u,k.2]`` with the signals' names; D has ``D[u,y]``.
     """
 
-    order: int
+    order: int  #: Number of states n, at least 1.
     _: KW_ONLY
-    proper: bool = False
-    stable: bool = False
+    proper: bool = False  #: Whether there is a direct term D; strictly proper if not.
+    stable: bool = False  #: Whether the controller itself must be stable.
+    #: Bounds by parameter name.  Block k has ``alpha0[k]``, ``alpha1[k]`` (its poles are the roots
+    #: of s^2 + alpha1 s + alpha0), ``B[k.1,y]``, ``B[k.2,y]`` and ``C[u,k.1]``, ``C[u,k.2]`` with
+    #: the signals' names; D has ``D[u,y]``.
     bounds: Bounds = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -415,21 +403,11 @@ class LowOrderLaw(ParametrisedController):
 
 @dataclass(frozen=True, kw_only=True)
 class LowOrderFeedback(Structure):
-    """`LowOrder` on the payload's motion, or on all that is aboard.
+    """`LowOrder` on the payload's motion, or on all that is aboard."""
 
-    Attributes
-    ----------
-    order
-        Number of states; 0 as long as it is not known how many it takes.
-    family
-        What it is called, but for the order.
-    measurements
-        Names of what it hears.
-    """
-
-    order: int
-    family: str = "low-order"
-    measurements: tuple[str, ...] = MEASUREMENTS
+    order: int  #: Number of states; 0 as long as it is not known how many it takes.
+    family: str = "low-order"  #: What it is called, but for the order.
+    measurements: tuple[str, ...] = MEASUREMENTS  #: Names of what it hears.
     hears_payload: bool = True
 
     @property

@@ -10,8 +10,6 @@ with a peak becomes white noise through an oscillator (`whitened`); good enough 
 from, and nothing that is reported rests on it.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -53,10 +51,8 @@ class LqgEstimator:
 def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -> LqgRegulator:
     """Return the state feedback that minimises E[x'Qx + 2 x'Su + u'Ru].
 
-    Raises
-    ------
-    SolverError
-        If R is singular (an input is free of charge) or no feedback stabilises the plant.
+    Raises SolverError if R is singular (an input is free of charge) or no feedback stabilises the
+    plant.
     """
     found = solve_riccati(plant.A, plant.B, Q, R, S)
     return LqgRegulator(gain=found.gain, R=R, X=found.X)
@@ -65,10 +61,7 @@ def regulator(plant: LinearPlant, Q: FloatArray, R: FloatArray, S: FloatArray) -
 def estimator(plant: LinearPlant, W: FloatArray, V: FloatArray, U: FloatArray) -> LqgEstimator:
     """Return the filter for noises of intensity W on x', V on y, and U between the two.
 
-    Raises
-    ------
-    SolverError
-        If V is singular (a measurement has no noise) or no filter is stable.
+    Raises SolverError if V is singular (a measurement has no noise) or no filter is stable.
     """
     found = solve_riccati(plant.A.T, plant.C.T, W, V, U)
     return LqgEstimator(gain=-found.gain.T, V=V, Y=found.X)

@@ -8,8 +8,6 @@ evaluates that very function, so that a controller called from Python and one co
 simulation give the same commands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -103,27 +101,13 @@ class RecursiveController:
     What it is never changes; what it remembers from one step to the next does, and `reset`
     forgets it.
 
-    Parameters
-    ----------
-    name
-        What it is called in results.
-    sample_time
-        Time from one step to the next [s], 0.0001 to 10.
-    recursion
-        The law.
-    brake
-        Whether the drum is held by its brake instead of the motor.
-
-    Raises
-    ------
-    InputError
-        If the sample time is out of its range.
+    Raises InputError if the sample time is out of its range.
     """
 
-    name: str
-    sample_time: float
-    recursion: Recursion = field(repr=False)
-    brake: bool = False
+    name: str  #: What it is called in results.
+    sample_time: float  #: Time from one step to the next [s], 0.0001 to 10.
+    recursion: Recursion = field(repr=False)  #: The law.
+    brake: bool = False  #: Whether the drum is held by its brake instead of the motor.
     _stepper: _Stepper = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -157,9 +141,6 @@ class RecursiveController:
 def checked_sample_time(owner: str, sample_time: float) -> float:
     """Return a sample time that is within its range [s].
 
-    Raises
-    ------
-    InputError
-        If it is not.
+    Raises InputError if it is not.
     """
     return check_range(owner, "sample_time", sample_time, low=_SHORTEST, high=_LONGEST, unit="s")

@@ -3,8 +3,6 @@
 `synth.controllers.linear_feedback` is made of these matrices; they know nothing of a case.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

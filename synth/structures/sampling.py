@@ -40,31 +40,19 @@ ON_CIRCLE = 1e-9  # an eigenvalue this far outside is a drum that integrates, no
 class SampledLoop:
     """The loop of a linear plant and a recursion; `sampled_loop` makes it from a case.
 
-    Parameters
-    ----------
-    plant
-        The plant; it measures the payload's three signals and has the winch's outputs.
-    recursion
-        The controller; it is at rest after one sample of `rest`.
-    rest
-        What is measured at rest.
-    sample_time
-        T [s].
-    load_cell_bandwidth
-        First-order bandwidth of the tension signal [rad/s], inf for none.
-    command_delay
-        Delay of the command [s], which the plant has in those of its measurements.
-
     Notes
     -----
     Delays of the payload's signals and of the command are rounded up to whole samples each.
     """
 
+    #: The plant; it measures the payload's three signals and has the winch's outputs.
     plant: LinearPlant
-    recursion: Recursion
-    rest: Measurement
-    sample_time: float
+    recursion: Recursion  #: The controller; it is at rest after one sample of `rest`.
+    rest: Measurement  #: What is measured at rest.
+    sample_time: float  #: T [s].
+    #: First-order bandwidth of the tension signal [rad/s], inf for none.
     load_cell_bandwidth: float = math.inf
+    #: Delay of the command [s], which the plant has in those of its measurements.
     command_delay: float = 0.0
 
     @cached_property

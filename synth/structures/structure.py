@@ -9,8 +9,6 @@ Signs: u = +C y.  The thesis's feedback E_a = -A (a P'' + a_1 P' + a_2 P) is
 C = -A [a, a_1, a_2].
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -121,27 +119,18 @@ class Structure(ABC):
     def bind(self, plant: LinearPlant) -> ParametrisedController:
         """Return the law for `plant`.
 
-        Raises
-        ------
-        InputError
-            If the plant lacks a signal that the structure needs.
+        Raises InputError if the plant lacks a signal that the structure needs.
         """
 
 
 @dataclass(frozen=True, kw_only=True)
 class StaticGain(Structure):
-    """Static output feedback u = K y, every entry free.
+    """Static output feedback u = K y, every entry free."""
 
-    Parameters
-    ----------
-    mask
-        Which entries are free, (nu, ny) of true and false; all if left out.  The others are 0.
-    bounds
-        Bounds by parameter name; the entry of input i and measurement j is ``K[i,j]`` with
-        the signals' names, e.g. ``K[u1,y2]``.
-    """
-
+    #: Which entries are free, (nu, ny) of true and false; all if left out.  The others are 0.
     mask: tuple[tuple[bool, ...], ...] | None = None
+    #: Bounds by parameter name; the entry of input i and measurement j is ``K[i,j]`` with the
+    #: signals' names, e.g. ``K[u1,y2]``.
     bounds: Bounds = field(default_factory=dict)
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:
@@ -157,23 +146,16 @@ class StaticGain(Structure):
 
 @dataclass(frozen=True, kw_only=True)
 class PayloadFeedback(Structure):
-    """The thesis's feedback u = -A (a P'' + a1 P' + a2 P), 1975 thesis eq. 30.
-
-    Parameters
-    ----------
-    amplifier
-        The fixed gain A.  Only the products A a, A a1, A a2 act on the plant: with A free
-        too, the scale would be redundant and the Hessian singular.
-    measurements
-        Names of P'', P', P among the plant's measurements.
-    bounds
-        Bounds of ``a``, ``a1``, ``a2``, in their own units (command per measurement over A).
-    """
+    """The thesis's feedback u = -A (a P'' + a1 P' + a2 P), 1975 thesis eq. 30."""
 
     name: ClassVar[str] = "payload-feedback"
     hears_payload: ClassVar[bool] = True
+    #: The fixed gain A.  Only the products A a, A a1, A a2 act on the plant: with A free too, the
+    #: scale would be redundant and the Hessian singular.
     amplifier: float = 1.0
+    #: Names of P'', P', P among the plant's measurements.
     measurements: tuple[str, ...] = MEASUREMENTS
+    #: Bounds of ``a``, ``a1``, ``a2``, in their own units (command per measurement over A).
     bounds: Bounds = field(default_factory=dict)
 
     def bind(self, plant: LinearPlant) -> ParametrisedController:
@@ -263,10 +245,7 @@ class _GainLaw(ParametrisedController):
 def check_bounds(owner: str, bounds: Bounds, names: Sequence[str]) -> None:
     """Check that bounds belong to known parameters and leave them room.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown, or a lower bound is not below the upper one.
+    Raises InputError if a name is unknown, or a lower bound is not below the upper one.
     """
     for name, (low, high) in bounds.items():
         if name not in names:

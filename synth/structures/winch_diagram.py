@@ -24,8 +24,6 @@ speed and so damps the rope's resonance, cv [-] makes the rope stiffer, cp [1/s]
 `synth.structures.winch_structures` gives each of them for a case by its name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -64,37 +62,21 @@ _TOP = 3.0  # candidates' loop gains reach this at their crossover
 
 @dataclass(frozen=True, kw_only=True)
 class WinchStructure(Structure):
-    """A structure put together from payload feedback, drum loop, feed-forward and tension.
+    """A structure put together from payload feedback, drum loop, feed-forward and tension."""
 
-    Attributes
-    ----------
-    name
-        What it is called.
-    motor
-        The motor as the drum loop sees it.
-    amplifier
-        The fixed gain A of payload feedback.
-    pace
-        Frequency of the rope's first axial mode [rad/s], which sizes what the payload asks for.
-    filters
-        Sections behind the payload's gains.
-    hears_payload, drum, heave
-        Whether there is payload feedback, a drum loop, feed-forward of the heave.
-    tension
-        Stiffness of the rope [N/m] if the drum loop follows its tension, else None.
-    bounds
-        Bounds by parameter name, in the parameter's unit.
-    """
-
-    name: str
-    motor: SteadyMotion
-    amplifier: float = 1.0
+    name: str  #: What it is called.
+    motor: SteadyMotion  #: The motor as the drum loop sees it.
+    amplifier: float = 1.0  #: The fixed gain A of payload feedback.
+    #: Frequency of the rope's first axial mode [rad/s], which sizes what the payload asks for.
     pace: float = 1.0
-    filters: tuple[FilterSection, ...] = ()
+    filters: tuple[FilterSection, ...] = ()  #: Sections behind the payload's gains.
+    #: Whether there is payload feedback, a drum loop, feed-forward of the heave.
     hears_payload: bool = True
     drum: bool = False
     heave: bool = False
+    #: Stiffness of the rope [N/m] if the drum loop follows its tension, else None.
     tension: float | None = None
+    #: Bounds by parameter name, in the parameter's unit.
     bounds: Bounds = field(default_factory=dict)
 
     def __post_init__(self) -> None:

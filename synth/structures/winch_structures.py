@@ -4,8 +4,6 @@
 they are put together is said in `synth.structures.winch_diagram`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -55,10 +53,8 @@ def structure_aboard(name: str, case: Case) -> PayloadFeedback | WinchStructure 
     A sensor that a case does not name is not aboard; one without errors has to be named as such,
     as ``sensors.mru: {noise_floor: 0, noise_fraction: 0}``.
 
-    Raises
-    ------
-    InputError
-        If there is no structure of that name, or a sensor that it hears is not aboard.
+    Raises InputError if there is no structure of that name, or a sensor that it hears is not
+    aboard.
     """
     structure = structure_named(name, case)
     missing = [heard for heard in structure.measurements if heard not in aboard(case)]

@@ -4,8 +4,6 @@ The check knows none of the code that it checks, not even its types: what the me
 said where they are kept, in `synth.design` and in what that is made of.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 

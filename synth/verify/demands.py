@@ -5,8 +5,6 @@ optimiser is missed; those of a `synth.design.tuning` problem are read off its l
 becomes a `Demand`, and `Demand.measured` says what a recomputed loop makes of it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -59,48 +57,27 @@ _KINDS = {  # by class of `synth.limits.margin_limits` and `synth.limits.signal_
 
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """One limit.
+    """One limit."""
 
-    Attributes
-    ----------
-    name
-        As in reports.
-    kind
-        A margin (``max_sensitivity``, ``gain``, ``gain_down``, ``delay``, ``disk``), a gain
-        (``low_frequency``, ``roll_off``, ``weighted``), a figure of the poles (``decay``,
-        ``damping``, ``frequency``) or a size (``rms``, ``continuous``, ``peak``, ``least``,
-        ``power``, ``thermal``, ``breakdown``).
-    bound
-        The bound.
-    enforced
-        Whether it binds the design.
-    outputs
-        The signals that it is about.
-    disturbance
-        The other end of a ``low_frequency`` or ``weighted`` gain.
-    static, loss
-        Value at rest of the (first) signal, and what losses that switch carry it to either side.
-    frequency
-        Up to which (``low_frequency``) or from which (``roll_off``) it holds [rad/s].
-    duration
-        Exposure time of a peak [s].
-    weights
-        Of a ``weighted`` gain, from frequencies [rad/s].
-    base_speed
-        Of ``thermal`` and ``breakdown``, from which the motor's torque falls [rad/s].
-    """
-
-    name: str
+    name: str  #: As in reports.
+    #: A margin (``max_sensitivity``, ``gain``, ``gain_down``, ``delay``, ``disk``), a gain
+    #: (``low_frequency``, ``roll_off``, ``weighted``), a figure of the poles (``decay``,
+    #: ``damping``, ``frequency``) or a size (``rms``, ``continuous``, ``peak``, ``least``,
+    #: ``power``, ``thermal``, ``breakdown``).
     kind: str
-    bound: float
-    enforced: bool = True
-    outputs: tuple[str, ...] = ()
-    disturbance: str = ""
+    bound: float  #: The bound.
+    enforced: bool = True  #: Whether it binds the design.
+    outputs: tuple[str, ...] = ()  #: The signals that it is about.
+    disturbance: str = ""  #: The other end of a ``low_frequency`` or ``weighted`` gain.
+    #: Value at rest of the (first) signal, and what losses that switch carry it to either side.
     static: float = 0.0
     loss: float = 0.0
+    #: Up to which (``low_frequency``) or from which (``roll_off``) it holds [rad/s].
     frequency: float = math.nan
-    duration: float = math.nan
+    duration: float = math.nan  #: Exposure time of a peak [s].
+    #: Of a ``weighted`` gain, from frequencies [rad/s].
     weights: Callable[[FloatArray], FloatArray] = np.ones_like
+    #: Of ``thermal`` and ``breakdown``, from which the motor's torque falls [rad/s].
     base_speed: float = math.nan
 
     @property
@@ -193,10 +170,7 @@ class Demand:
 def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
     """Return a limit of `synth.design.tuning` as a demand.
 
-    Raises
-    ------
-    SolverError
-        If there is no independent way to measure that kind.
+    Raises SolverError if there is no independent way to measure that kind.
     """
     kind = _KINDS.get(type(limit).__name__)
     if kind is None:

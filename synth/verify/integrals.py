@@ -5,8 +5,6 @@ Here the band is cut into panels of another kind, all of them are integrated at 
 Gauss rules, and those are halved where the two differ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -174,10 +174,7 @@ def curve_margins(difference: Function, marks: ComplexArray) -> CurveMargins:
     From 1e-4 rad/s, or a hundredth of the slowest mark, to a hundred times the fastest one; in
     pieces between the undamped poles of the open loop, where the curve goes through infinity.
 
-    Raises
-    ------
-    SolverError
-        If its phase cannot be followed.
+    Raises SolverError if its phase cannot be followed.
     """
     sizes = np.abs(marks)
     sizes = sizes[sizes > 1e-9 * sizes.max(initial=0.0)]

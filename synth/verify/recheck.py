@@ -133,30 +133,16 @@ def roots_near(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CheckedLoop(Loop):
-    """A loop put together again, what shakes it, and what is asked of it.
+    """A loop put together again, what shakes it, and what is asked of it."""
 
-    Attributes
-    ----------
-    sources
-        What shakes it.
-    demands
-        What is demanded of it, by name.
-    own
-        Outputs whose variances are wanted besides.
-    still
-        The loop without losses that switch, whose margins count too; None where it has none.
-    signs
-        What the reference unit shows with each combination of signs of its errors, if it has some.
-    rest
-        What shakes the loop beside those errors.
-    """
-
-    sources: Sequence[SpectralSource]
-    demands: Mapping[str, Demand]
-    own: Iterable[str]
+    sources: Sequence[SpectralSource]  #: What shakes it.
+    demands: Mapping[str, Demand]  #: What is demanded of it, by name.
+    own: Iterable[str]  #: Outputs whose variances are wanted besides.
+    #: The loop without losses that switch, whose margins count too; None where it has none.
     still: CheckedLoop | None = None
+    #: What the reference unit shows with each combination of signs of its errors, if it has some.
     signs: Sequence[complex] = ()
-    rest: Sequence[SpectralSource] = ()
+    rest: Sequence[SpectralSource] = ()  #: What shakes the loop beside those errors.
 
     @classmethod
     def of(

@@ -65,24 +65,14 @@ class LawMatrices:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loop:
-    """A plant with a controller around it, known by their responses.
+    """A plant with a controller around it, known by their responses."""
 
-    Attributes
-    ----------
-    plant
-        The plant, its drag in it and its delays exact.
-    law
-        The controller's matrices, for u = +C y.
-    marks
-        Poles [1/s] near which something happens: of the open and of the closed loop.
-    exact
-        Points s and names of disturbances -> the plant's blocks, where they are not those of
-        `plant` (a distributed rope).
-    """
-
-    plant: LinearPlant
-    law: LawMatrices
+    plant: LinearPlant  #: The plant, its drag in it and its delays exact.
+    law: LawMatrices  #: The controller's matrices, for u = +C y.
+    #: Poles [1/s] near which something happens: of the open and of the closed loop.
     marks: ComplexArray
+    #: Points s and names of disturbances -> the plant's blocks, where they are not those of `plant`
+    #: (a distributed rope).
     exact: Callable[[ComplexArray, Sequence[str]], PlantResponse] | None = None
     _known: dict[Any, tuple[PlantResponse, ComplexArray]] = field(default_factory=dict)
     _parts: dict[Any, LinearPlant] = field(default_factory=dict)

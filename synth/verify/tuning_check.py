@@ -5,8 +5,6 @@ the cost by other quadrature and, where all disturbances are white, by a Lyapuno
 every limit, the drag, and whether the parameters are those of the controller.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -12,30 +12,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One figure, looked at a second time.
+    """One figure, looked at a second time."""
 
-    Attributes
-    ----------
-    name
-        What was checked, as a dotted path.
-    ok
-        Whether it holds.
-    claimed, found
-        The figure that was claimed and the one found; None where there is no such figure.
-    tolerance
-        Allowed relative difference, or excess over a bound.
-    note
-        By which route, and what else there is to say.
-    counts
-        Whether `Verification.ok` hangs on it; a check that does not is for information.
-    """
-
-    name: str
-    ok: bool
+    name: str  #: What was checked, as a dotted path.
+    ok: bool  #: Whether it holds.
+    #: The figure that was claimed and the one found; None where there is no such figure.
     claimed: float | None = None
     found: float | None = None
-    tolerance: float = 0.0
-    note: str = ""
+    tolerance: float = 0.0  #: Allowed relative difference, or excess over a bound.
+    note: str = ""  #: By which route, and what else there is to say.
+    #: Whether `Verification.ok` hangs on it; a check that does not is for information.
     counts: bool = True
 
     def __str__(self) -> str:
@@ -52,21 +38,11 @@ class Check:
 
 @dataclass(frozen=True, kw_only=True)
 class Verification:
-    """The outcome of all checks.
+    """The outcome of all checks."""
 
-    Attributes
-    ----------
-    ok
-        Whether every check that counts holds.
-    status
-        The sentence for the user.
-    checks
-        The checks in the order they were made.
-    """
-
-    ok: bool
-    status: str
-    checks: tuple[Check, ...]
+    ok: bool  #: Whether every check that counts holds.
+    status: str  #: The sentence for the user.
+    checks: tuple[Check, ...]  #: The checks in the order they were made.
 
     @classmethod
     def of(cls, checks: Sequence[Check], praise: str) -> Verification:
@@ -93,10 +69,7 @@ class Verification:
     def __getitem__(self, name: str) -> Check:
         """Return the check of that name.
 
-        Raises
-        ------
-        KeyError
-            If there is none.
+        Raises KeyError if there is none.
         """
         for check in self.checks:
             if check.name == name:

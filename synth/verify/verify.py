@@ -10,8 +10,6 @@ the question, the search or the design is used.  `verify_tuning` does the same f
 `synth.design.tune` on any linear plant.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace

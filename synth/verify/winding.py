@@ -19,8 +19,6 @@ the half circles leave out is counted by a full circle.  And the large arc is mo
 is small on it and beyond, so that by the maximum principle nothing lies further out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -43,34 +41,18 @@ _PER_DECADE = 40
 
 @dataclass(frozen=True, kw_only=True)
 class Winding:
-    """The count of a closed loop's poles in the right half plane.
+    """The count of a closed loop's poles in the right half plane."""
 
-    Attributes
-    ----------
-    unstable
-        Poles of the closed loop in the open right half plane; -1 if the count failed.
-    marginal
-        Poles of the closed loop so close to an open-loop pole on the imaginary axis that they
-        count as on the axis themselves, such as an integrator that the controller cannot see.
-    open_loop
-        Poles of the open loop in the open right half plane.
-    radius
-        Radius of the large arc [1/s].
-    tail
-        Largest |D/D(inf) - 1| seen on it and beyond.
-    points
-        Evaluations of D that it took.
-    failure
-        Why there is no count; empty if there is one.
-    """
-
+    #: Poles of the closed loop in the open right half plane; -1 if the count failed.
     unstable: int = -1
+    #: Poles of the closed loop so close to an open-loop pole on the imaginary axis that they count
+    #: as on the axis themselves, such as an integrator that the controller cannot see.
     marginal: int = 0
-    open_loop: int = 0
-    radius: float = np.inf
-    tail: float = np.inf
-    points: int = 0
-    failure: str = ""
+    open_loop: int = 0  #: Poles of the open loop in the open right half plane.
+    radius: float = np.inf  #: Radius of the large arc [1/s].
+    tail: float = np.inf  #: Largest |D/D(inf) - 1| seen on it and beyond.
+    points: int = 0  #: Evaluations of D that it took.
+    failure: str = ""  #: Why there is no count; empty if there is one.
 
     @property
     def stable(self) -> bool:
@@ -141,10 +123,7 @@ def turn(
 ) -> float:
     """Return the change of a function's phase along a path [rad], followed as by `trace`.
 
-    Raises
-    ------
-    SolverError
-        If the phase cannot be followed.
+    Raises SolverError if the phase cannot be followed.
     """
     _, values = trace(function, path, start)
     return float(np.angle(values[1:] / values[:-1]).sum())
