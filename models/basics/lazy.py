@@ -16,16 +16,9 @@ def lazy_face(
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package (PEP 562).
 
-    Parameters
-    ----------
-    package
-        Its ``__name__``.
-    file
-        Its ``__file__``, whose ``if TYPE_CHECKING`` says where each name comes from.
-
-    Notes
-    -----
-    A name must not be that of a module in the package: once imported, the module would hide it.
+    The package is given by its ``__name__`` and its ``__file__``, whose ``if TYPE_CHECKING`` says
+    where each name comes from.  A name must not be that of a module in the package: once imported,
+    the module would hide it.
     """
     homes: dict[str, str] = {}
     for block in ast.parse(Path(file).read_text(encoding="utf-8")).body:

@@ -331,20 +331,10 @@ def zener_branches(
     alone.  So the law follows zeta and the first mode smoothly, and steps, by the few per cent of
     its loss, where another highest mode over first mode asks for another branch.
 
-    Parameters
-    ----------
-    damping_ratio
-        zeta of the first mode [-], (n,) or one number; zero has no branches.
-    first_mode
-        The first mode, upper end held, likewise [rad/s].
-    highest
-        Highest mode whose damping is to hold, likewise [rad/s]; at least the first.
-
-    Returns
-    -------
-    k_0, k, tau : ndarray
-        Share of the slow stiffness (n,); shares (7, n) and times (7, n) [s] of the branches, by
-        falling time, zero where a rope has fewer.
+    zeta of the first mode [-], the first mode with the upper end held, and the highest mode whose
+    damping is to hold, at least the first [rad/s], are (n,) or one number each; without damping
+    there are no branches.  Returned are the share k_0 of the slow stiffness (n,), and shares k and
+    times tau [s] of the branches (7, n), by falling time, zero where a rope has fewer.
     """
     ratio, first, top = np.broadcast_arrays(
         *(

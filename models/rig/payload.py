@@ -162,15 +162,7 @@ class Payload(Section):
 def energy_equivalent(quadratic: float, amplitude: float, frequency: float) -> float:
     """Return the C that takes as much energy as q v|v| from a sine [N s/m].
 
-    C = 8/(3 pi) q omega Y = 4/(3 pi) rho C_D A omega Y (1975 thesis, eq. 13).
-
-    Parameters
-    ----------
-    quadratic
-        q = rho C_D A / 2 [N s2/m2].
-    amplitude
-        Amplitude Y of the displacement [m].
-    frequency
-        omega [rad/s].
+    C = 8/(3 pi) q omega Y = 4/(3 pi) rho C_D A omega Y (1975 thesis, eq. 13).  Y is the
+    displacement's amplitude [m], omega its frequency [rad/s], and q is rho C_D A / 2 [N s2/m2].
     """
     return 8.0 / (3.0 * math.pi) * quadratic * frequency * amplitude

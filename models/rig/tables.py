@@ -46,29 +46,17 @@ DRUM_LAYERS: Mapping[str, tuple[tuple[float, float], ...]] = {
 
 
 def prism_added_mass(side: float, height: float, density: float) -> float:
-    """Return the added mass K rho a^2 b of a square prism that moves vertically.
+    """Return the added mass K rho a^2 b [kg] of a square prism that moves vertically.
 
     K is read from Table A-1 of the 1975 thesis by a power law between its entries, which follows
     the table's steep start (K falls from 2.32 to 0.86 between b/a = 1 and 2) without kinks on
     logarithmic axes.  The table's values for short prisms are above those in use today; give
     `payload.added_mass` where a better figure is known.
 
-    Parameters
-    ----------
-    side, height
-        Side a of the square, and height b along the motion [m].
-    density
-        Density of the water [kg/m3].
+    The side of the square is a [m], the height along the motion b [m], the water's density rho
+    [kg/m3].
 
-    Returns
-    -------
-    float
-        Added mass [kg].
-
-    Raises
-    ------
-    InputError
-        If b/a lies outside the table, 1 to 10: it is not extrapolated.
+    Raises InputError if b/a lies outside the table, 1 to 10: it is not extrapolated.
     """
     slenderness = check_range(
         "prism", "height / side", height / side,

@@ -246,24 +246,13 @@ class Drum(Section):
                         yield (f"layers.{i}.{name}", text)
 
     def radius_at(self, paid_out: float, rope_diameter: float) -> float:
-        """Return the pitch radius with a length of rope paid out.
+        """Return the pitch radius [m] with a length of rope paid out [m].
 
-        Parameters
-        ----------
-        paid_out
-            Rope paid out [m].
-        rope_diameter
-            Nominal diameter of the rope [m]; matters for a drum given by its geometry.
+        It is that from the drum's axis to the centre of the rope's topmost layer.  The rope's
+        nominal diameter [m] matters for a drum given by its geometry.
 
-        Returns
-        -------
-        float
-            Radius from the drum's axis to the centre of the rope's topmost layer [m].
-
-        Raises
-        ------
-        InputError
-            If more rope is paid out than the drum has, or more is on it than its layers hold.
+        Raises InputError if more rope is paid out than the drum has, or more is on it than its
+        layers hold.
         """
         if self.radius is not None:
             return self.radius

@@ -229,18 +229,10 @@ def prepare(
     scenario: Scenario | str = "hold",
     options: SimulationOptions | None = None,
 ) -> Simulation:
-    """Prepare a simulation.
+    """Prepare the simulation of a case under a controller, which makes the drive's commands.
 
-    Parameters
-    ----------
-    case
-        Vessel, sea, rope, payload, winch and sensors.
-    controller
-        What makes the drive's commands; every run resets it.
-    scenario
-        What is asked of it, or the name of a scenario.
-    options
-        How to simulate.
+    Every run resets the controller.  The scenario says what is asked of it, and may be given by its
+    name.
 
     Raises
     ------

@@ -170,19 +170,11 @@ class Spread:
     ) -> Spread:
         """Return the spread in plain numbers on a case, every path and end of a range checked.
 
-        Parameters
-        ----------
-        case
-            The case.
-        gains
-            The design's gains (or a structure's parameters); the case's own if left out.
-        drag
-            The design's linear drag coefficient [N s/m], for the path ``drag``.
+        The gains are the design's (or a structure's parameters), by default the case's own; `drag`
+        is the design's linear drag coefficient [N s/m], for the path ``drag``.
 
-        Raises
-        ------
-        InputError
-            If a path is unknown, a value has the wrong unit, or an end of a range is refused.
+        Raises InputError if a path is unknown, a value has the wrong unit, or an end of a range is
+        refused.
         """
         if gains is None and case.gains is not None:
             gains = {name: getattr(case.gains, name) for name in type(case.gains).model_fields}

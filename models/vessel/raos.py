@@ -159,7 +159,7 @@ class VesselRaos(ReadOnlyArrays):
     def response(
         self, omega: npt.ArrayLike, heading: npt.ArrayLike, *, smooth: bool = False
     ) -> ComplexArray:
-        """Return the six operators at any frequency and heading.
+        """Return the six operators (..., 6) [m/m, rad/m] at any frequency and heading.
 
         Between two frequencies amplitude and unwrapped phase are each linear, as in
         :class:`models.vessel.vessel.HeaveRao` and for its reasons.  Between two headings the
@@ -175,24 +175,12 @@ class VesselRaos(ReadOnlyArrays):
         Below the table heave tends linearly to 1 with zero phase, the angles keep their ratio to
         the wave slope, the other motions their first value; above, amplitudes fall with omega^-2.
 
-        Parameters
-        ----------
-        omega, heading
-            Frequencies, at least zero [rad/s], and headings [rad]; they are broadcast.
-        smooth
-            Whether headings that straight lines join are joined by a periodic cubic spline
-            instead: the difference tells how far the lines are off.
+        Frequencies [rad/s] are at least zero; they and the headings [rad] are broadcast.  If
+        `smooth`, headings that straight lines join are joined by a periodic cubic spline instead:
+        the difference tells how far the lines are off.
 
-        Returns
-        -------
-        ComplexArray
-            Motions (..., 6) [m/m, rad/m].
-
-        Raises
-        ------
-        InputError
-            If a heading lies in a gap of the table wider than a quarter of the circle: nobody
-            has computed the vessel there.
+        Raises InputError if a heading lies in a gap of the table wider than a quarter of the
+        circle: nobody has computed the vessel there.
         """
         frequency, direction = np.broadcast_arrays(
             np.asarray(omega, dtype=np.float64), np.asarray(heading, dtype=np.float64)
@@ -272,20 +260,12 @@ class VesselRaos(ReadOnlyArrays):
     ) -> VesselRaos:
         """Return six :class:`waveresponse.RAO` objects as one table.
 
-        Parameters
-        ----------
-        raos
-            One object per motion, under the names of :data:`MODES`; what is missing is zero.
-            Their own wave conventions are read from them.
-        name
-            What the vessel is called.
-        depth
-            Water depth [m].
+        There is one for each motion, under the names of :data:`MODES`; what is missing is zero.
+        Their own wave conventions are read from them.  `name` is what the vessel is called, `depth`
+        that of the water [m].
 
-        Raises
-        ------
-        InputError
-            If a motion is unknown, or two of them have different frequencies or headings.
+        Raises InputError if a motion is unknown, or two of them have different frequencies or
+        headings.
         """
         strange = sorted(set(raos) - set(MODES))
         if strange or not raos:

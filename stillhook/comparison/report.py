@@ -66,21 +66,9 @@ def comparison_report(found: Comparison) -> Report:
 def write_comparison(
     folder: str | Path | OutputFolder, found: Comparison, *, figures: bool = True
 ) -> list[Path]:
-    """Write a comparison into a folder, and return the files written.
+    """Write a comparison into a folder, made if need be, and return the files written.
 
-    Parameters
-    ----------
-    folder
-        The folder; it is made if need be.
-    found
-        The comparison.
-    figures
-        Whether to draw figures.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written.
+    `figures` says whether to draw figures.  Raises InputError if a file cannot be written.
     """
     place = OutputFolder.prepare(folder)
     report = comparison_report(found)

@@ -22,21 +22,11 @@ _SHIFTED = ("drive.applied", "rope.tension", "motor.torque")
 
 
 class Shift(NamedTuple):
-    """A static state, or by how much the true one is above that which a controller knows.
+    """A static state, or by how much the true one is above that which a controller knows."""
 
-    Attributes
-    ----------
-    command
-        Drive command [V, rad/s or N m].
-    tension
-        Rope tension at the drum [N].
-    torque
-        Motor torque [N m].
-    """
-
-    command: float
-    tension: float
-    torque: float
+    command: float  #: Drive command [V, rad/s or N m].
+    tension: float  #: Rope tension at the drum [N].
+    torque: float  #: Motor torque [N m].
 
 
 def static_of(case: Case) -> Shift:

@@ -83,14 +83,8 @@ class DualPoint:
 class Dual:
     """LQG on a plant whose disturbances are white and of intensity one.
 
-    Parameters
-    ----------
-    plant
-        See `synth.bound.dual.shaped`; without delays and rates.
-    minimise
-        Weights on variances of outputs by name.
-    limits
-        Bounds on the rms of outputs by name.
+    The plant is as of `shaped_plant`, without delays and rates.  `minimise` are weights on the
+    variances of outputs, `limits` bounds on the rms of outputs, by name.
 
     Raises
     ------

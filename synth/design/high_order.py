@@ -32,19 +32,10 @@ def high_order_gains(
 
     It may break a limit, as one on power or on the delay, that no round could mend.
 
-    Parameters
-    ----------
-    case
-        The case.
-    order
-        States at most; by default as many as it takes.
-    progress
-        Called as progress(stage, done, total).
+    The controller has at most `order` states, by default as many as it takes.  `progress` is called
+    as progress(stage, done, total).
 
-    Raises
-    ------
-    SynthesisError
-        If no such controller is found.
+    Raises SynthesisError if no such controller is found.
     """
     masses = 1 if case.rope.lumping == "thesis" else MAX_MASSES
     question = pose(case, "high-order", masses)

@@ -38,16 +38,9 @@ def shortfall(
 ) -> Shortfall | None:
     """Return the largest feasible sea and what is missing, or None if no sea is feasible.
 
-    Of a family the seas of all members grow and shrink together.
-
-    Parameters
-    ----------
-    problem
-        The problem, with all its limits.
-    free
-        The answer without drive limits, to start from.
-    progress
-        Called as progress(stage, done, total).
+    Of a family the seas of all members grow and shrink together.  The problem has all its limits;
+    `free` is the answer without drive limits, to start from.  `progress` is called as
+    progress(stage, done, total).
     """
     family = FamilyProblem.of(problem)
     if progress is not None:
@@ -96,12 +89,8 @@ def larger_sea(
 ) -> tuple[float, FloatArray] | None:
     """Return the share of a sea that near parameters can do, and those; None if it is not found.
 
-    Parameters
-    ----------
-    problem
-        The problem in that sea.
-    values, known
-        Searched parameters that keep its limits there, and coefficients of each member's elements.
+    The problem is that in its sea, where `values`, searched parameters, keep its limits; `known`
+    are coefficients of each member's elements.
     """
     solved = settle(problem, values, known, Goal.SEA, reference=values, extra=0.0)
     if not solved.converged or not problem.stable(solved.values, solved.coefficients):

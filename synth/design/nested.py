@@ -53,14 +53,9 @@ def nested_starts(
 ) -> list[list[float]]:
     """Return parameter vectors to begin with: the best of each structure within this one.
 
-    Parameters
-    ----------
-    question
-        The question; a free controller's parameters get the sizes that go with the answer.
-    starts, seed
-        Starts of the search in question, of which the structures within get a few.
-    progress
-        Called as progress(stage, done, total).
+    The parameters of a free controller get the sizes that go with the answer.  `starts` and `seed`
+    are those of the search in question: the structures within get a few of its starts.  `progress`
+    is called as progress(stage, done, total).
     """
     structure = question.structure
     within = WITHIN.get(structure.name, ())

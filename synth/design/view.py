@@ -94,12 +94,8 @@ def prepare(
 class View:
     """A case, others like it if there are any, and a structure, prepared for many looks.
 
-    Parameters
-    ----------
-    posed
-        The questions of all members, on the rope masses that their cases ask for.
-    begin
-        Coefficients of each member's elements to begin with.
+    `posed` has the questions of all members, on the rope masses that their cases ask for; `begin`
+    has coefficients of each member's elements to begin with.
     """
 
     def __init__(self, posed: PosedFamily, begin: Sequence[Coefficients | None] = ()) -> None:
@@ -123,15 +119,8 @@ class View:
     def evaluate(self, gains: object) -> Look:
         """Return what given parameters do, by the code of the search alone.
 
-        Parameters
-        ----------
-        gains
-            As `evaluate_gains` takes them.
-
-        Raises
-        ------
-        InputError
-            If a parameter is missing, unknown or out of its range.
+        They are as `evaluate_gains` takes them.  Raises InputError if a parameter is missing,
+        unknown or out of its range.
         """
         parameters = checked_parameters(self.posed.first, gains)
         looks = on_common_masses([partial(one.loop, parameters) for one in self._members])
@@ -159,14 +148,9 @@ class View:
         """Return the optimum that one descent reaches from given parameters.
 
         It is never worse than a start that keeps the limits; there may be a better one elsewhere,
-        which `optimise_gains` looks for.
-
-        Parameters
-        ----------
-        start
-            As `evaluate_gains` takes them; by default the gains that the case has in use.
-        verify
-            Whether the design is checked as one by `optimise_gains` is.
+        which `optimise_gains` looks for.  The start is as `evaluate_gains` takes it, by default the
+        gains that the case has in use; if `verify`, the design is checked as one by
+        `optimise_gains` is.
 
         Raises
         ------

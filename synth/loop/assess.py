@@ -255,16 +255,10 @@ class Assessment:
     ) -> float:
         """Return the largest size of 1 + L of any loop, or of a response.
 
-        Parameters
-        ----------
-        size
-            From frequencies [rad/s] and what the curve is there to its size, (k,) each.
-        weight
-            From frequencies [rad/s] to the weight there, zero where the size does not matter.
-        edges
-            Frequencies [rad/s] at which the weight has a kink or an end.
-        channel
-            Output and disturbance of the closed-loop response that is looked at, if one is.
+        `size` leads from frequencies [rad/s] and what the curve is there to its size, `weight` from
+        frequencies to the weight there, zero where the size does not matter, (k,) each.  At `edges`
+        [rad/s] the weight has a kink or an end.  `channel` is output and disturbance of the
+        closed-loop response that is looked at, if one is.
         """
 
         def sizes(omega: FloatArray) -> FloatArray:
@@ -538,17 +532,10 @@ def consistent_coefficients(
 ) -> tuple[float, ...]:
     """Return the coefficients of elements that agree with the closed loop's own velocities.
 
-    Parameters
-    ----------
-    plant, controller, disturbances, elements, nodes
-        As `Assessment` takes them.
-    start
-        Coefficients to begin with; by default such of usual size.
+    The search begins with `start`, by default coefficients of usual size; the rest is as
+    `Assessment` takes it.
 
-    Raises
-    ------
-    SolverError
-        If none agree: the loop is unstable with any drag.
+    Raises SolverError if none agree: the loop is unstable with any drag.
     """
     drag = next((e for e in elements if isinstance(e, DragElement)), None)
     losses = [e for e in elements if e is not drag]

@@ -79,19 +79,13 @@ class CoherentError:
 def disturbances(spectrum: Mapping[str, Any], known: tuple[str, ...]) -> tuple[Disturbance, ...]:
     """Return the disturbances of a mapping from their names to their spectra.
 
-    Parameters
-    ----------
-    spectrum
-        By name of the disturbance: a `White` or a `ShapingFilter`, an object with ``density``,
-        ``band`` and ``splits`` (`models.basics.quadrature.SpectralDensity`), a callable of omega
-        [rad/s], or a table (omega, density), linear in between and zero outside.
-    known
-        Names of the plant's independent disturbances.
+    A spectrum is a `White` or a `ShapingFilter`, an object with ``density``, ``band`` and
+    ``splits`` (`models.basics.quadrature.SpectralDensity`), a callable of omega [rad/s], or a table
+    (omega, density), linear in between and zero outside.  `known` are the names of the plant's
+    independent disturbances.
 
-    Raises
-    ------
-    InputError
-        If there is none, a name is unknown, or a spectrum is none of these or is negative.
+    Raises InputError if there is none, a name is unknown, or a spectrum is none of these or is
+    negative.
     """
     if not spectrum:
         raise InputError("tune: spectrum must name at least one disturbance, got none")

@@ -19,18 +19,11 @@ Array = npt.NDArray[Any]
 
 
 class Dual:
-    """An array with its derivatives.
+    """Numbers (...,) with their derivatives by each of n variables, the slope (n, ...).
 
-    Parameters
-    ----------
-    value
-        The numbers, (...,).
-    slope
-        Their derivatives by each of n variables, (n, ...).
-    at
-        Which variables these are, ascending, where there are more of them: a chain of filters need
-        not carry zeros for what others depend on.  Numbers that are added up or multiplied all say
-        it or none does; the result depends on what either does.
+    `at` says which variables these are, ascending, where there are more of them: a chain of filters
+    need not carry zeros for what others depend on.  Numbers that are added up or multiplied all say
+    it or none does; the result depends on what either does.
     """
 
     __slots__ = ("at", "slope", "value")

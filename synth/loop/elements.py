@@ -62,17 +62,12 @@ class Element(ABC):
 class DragElement(Element):
     """Quadratic drag as force = -C velocity, C = quadratic sqrt(8/pi) sigma of the velocity.
 
-    Parameters
-    ----------
-    quadratic
-        q of the drag force q |v| v [N s2/m2].
-    velocity, force, reference
-        See `Element`; the reference in N s/m.
+    The reference is in N s/m.
     """
 
     velocity: str = "payload.velocity"
     force: str = "payload.force"
-    quadratic: float
+    quadratic: float  #: q of the drag force q |v| v [N s2/m2].
 
     def __post_init__(self) -> None:
         check_range("DragElement", "quadratic", self.quadratic, low=0.0, unit="N s2/m2")
@@ -96,20 +91,13 @@ class DragElement(Element):
 class LossElement(Element):
     """A loss that switches as torque = -b speed, b = sqrt(2/pi) torque / sigma of the speed.
 
-    Parameters
-    ----------
-    torque
-        What the loss comes to either way [N m].
-    usual
-        Standard deviation of the speed that is to be expected [rad/s].
-    velocity, force, reference
-        See `Element`; the reference in N m s/rad.
+    The reference is in N m s/rad.
     """
 
     velocity: str = "motor.speed"
     force: str = "motor.load"
-    torque: float
-    usual: float = 0.0
+    torque: float  #: What the loss comes to either way [N m].
+    usual: float = 0.0  #: Standard deviation of the speed that is to be expected [rad/s].
     lasting: ClassVar[bool] = False
 
     def __post_init__(self) -> None:

@@ -36,12 +36,8 @@ class PoleRegion:
     def of(poles: ComplexArray, models: ComplexArray | None = None) -> PoleRegion:
         """Return the region of a loop's poles [1/s].
 
-        Parameters
-        ----------
-        poles
-            The closed loop's poles, those that delay models bring with them among them.
-        models
-            Poles of the delay models alone.
+        They are all poles of the closed loop; `models` are those of the delay models alone, which
+        are among them.
         """
         known = np.zeros(0, dtype=np.complex128) if models is None else models
         swinging, all_left = (poles[counted] for counted in counted_poles(poles, known))

@@ -137,13 +137,7 @@ class Shaking:
 
 
 class LoopResponses:
-    """The closed loop at some points.
-
-    Parameters
-    ----------
-    blocks, closing
-        The plant's blocks, and what closes the loop at the same points.
-    """
+    """The closed loop at some points: the plant's blocks, and what closes it at the same points."""
 
     def __init__(self, blocks: LoopBlocks, closing: Closing) -> None:
         self.outputs, self.sources = blocks.outputs, blocks.sources
@@ -249,17 +243,9 @@ class LoopResponses:
     ) -> Any:
         """Return integrals of Re conj(F_one) S F_other over all disturbances: moments, covariances.
 
-        Parameters
-        ----------
-        outputs, pairs, orders
-            The outputs of which it is with themselves, then pairs of them, and the powers of omega.
-        shaking
-            S, its diagonal first and then what is beside it, one after the other.
-
-        Returns
-        -------
-        ndarray or Dual
-            (outputs and pairs, orders, ..., 1 + e).
+        They are of each output with itself, then of the pairs, for each power of omega in
+        `orders`.  S is given by its diagonal first and then what is beside it, one after the
+        other.  Returned is an array or a `Dual` (outputs and pairs, orders, ..., 1 + e).
         """
         rows = [self.outputs.index(name) for name in outputs]
         some = [[outputs.index(name) for name in pair] for pair in pairs]
@@ -380,14 +366,8 @@ def _inverse(a: ComplexArray) -> ComplexArray:
 def with_loops(cross: ComplexArray, felt: ComplexArray, gains: FloatArray) -> FloatArray:
     """Return variances of velocities with forces -gain velocity closed around them, (m,).
 
-    Parameters
-    ----------
-    cross
-        Cross-densities of the m velocities without, times quadrature weights, (m, m, k).
-    felt
-        Their responses to the forces, (m, m, k).
-    gains
-        One for each, (m,).
+    The m velocities have the cross-densities (m, m, k) without, times quadrature weights; `felt`
+    are their responses to the forces, (m, m, k).  There is one gain for each, (m,).
     """
     closed = _inverse(np.eye(len(gains))[:, :, None] + felt * gains[None, :, None])
     return np.asarray(np.einsum("abk,bck,ack->a", closed, cross, closed.conj()).real)

@@ -36,14 +36,8 @@ PAYLOAD_FEEDBACK = "payload-feedback"
 class FamilyQuestion:
     """One structure on a case and on cases like it, posed one by one.
 
-    Parameters
-    ----------
-    case
-        The case whose plant the structure is bound to.
-    structure
-        Name of the structure, see `synth.structures.structure_names`.
-    masses
-        Rope masses of every plant; by default what each case asks for.
+    The structure, named as in `synth.structures.structure_names`, is bound to the plant of the
+    case.  `masses` are the rope masses of every plant, by default what each case asks for.
     """
 
     def __init__(

@@ -234,23 +234,13 @@ def pose(
     A structure that does not hear the payload cannot do anything about its slow drift with the
     ship: for it the limit on slow motion is reported only.
 
-    Parameters
-    ----------
-    case
-        The case.
-    structure
-        Name of the structure, see `synth.structures.structure_names`.
-    masses
-        Rope masses; by default the case's, or a number that suits a quick loop.
-    known
-        The question of a similar case: what this one has in common with it is taken from there.
-    built_for
-        The case whose motor, drum and gains the structure is built for; by default the case.
+    `masses` along the rope are by default the case's, or a number that suits a quick loop.  What
+    the question has in common with that of a similar case, `known`, is taken from there.  The
+    structure, named as in `synth.structures.structure_names`, is built for the motor, the drum and
+    the gains of the case, or of `built_for`.
 
-    Raises
-    ------
-    InputError
-        If there is no such structure, or the case lacks what a design needs, such as a sensor.
+    Raises InputError if there is no such structure, or the case lacks what a design needs, such as
+    a sensor.
     """
     named = structure_aboard(structure, built_for or case)
     _warn_of_waves(case, named.measurements)
@@ -304,14 +294,8 @@ def equivalent_elements(
 ) -> tuple[Element, ...]:
     """Return what of a case's plant is linearised with the response: drag, and losses.
 
-    Parameters
-    ----------
-    case, data, hook
-        The case, its numbers and the hook's motion.
-    plant
-        The linear plant, with loads on its motor where that has losses.
-    drag
-        The linear drag that the plant holds [N s/m].
+    The plant is the linear one, with loads on its motor where that has losses, and holds the linear
+    drag [N s/m].
     """
     elements: list[Element] = []
     if case.payload.fixed_drag is None and data.quadratic_drag > 0.0:
@@ -441,14 +425,8 @@ def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float,
 def held_poles(data: PlantData, drag: float, highest: float) -> ComplexArray:
     """Return about where the poles are with the drum held [1/s], the upper half.
 
-    Parameters
-    ----------
-    data
-        The plant's numbers.
-    drag
-        Drag coefficient [N s/m]; it damps the first mode, as the payload hardly moves in others.
-    highest
-        Frequency up to which the modes are wanted [rad/s].
+    The drag coefficient [N s/m] damps the first mode, as the payload hardly moves in others.  Modes
+    are wanted up to the highest frequency [rad/s].
     """
     count = 1 if math.isinf(data.sling_stiffness) else 2
     if not data.one_spring:

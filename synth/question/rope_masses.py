@@ -53,12 +53,8 @@ def masses_and_reserve(
     """Return the rope masses that a stable loop asks for, and what its limits hold in reserve.
 
     As `masses_for`, but a search need not have more masses where a margin is broken on the
-    distributed rope by a few percent: it holds that margin with as much in reserve.
-
-    Returns
-    -------
-    tuple
-        The masses; and by name of the limit its relative excess on the distributed rope.
+    distributed rope by a few percent: it holds that margin with as much in reserve.  The reserve
+    is, by name of the limit, its relative excess on the distributed rope.
     """
     masses, excess = _masses(question, loop, _RESERVED)
     return masses, {name: over for name, over in excess.items() if over > _KEPT}
@@ -100,13 +96,7 @@ class _Seen:
 
 
 class _OnTheRope:
-    """A loop on the distributed rope instead of its masses.
-
-    Parameters
-    ----------
-    question, loop
-        The question, and the loop on its masses.
-    """
+    """The loop of a question on the distributed rope, instead of on its masses."""
 
     def __init__(self, question: DesignQuestion, loop: Assessment) -> None:
         self.question, self.loop = question, loop
@@ -227,20 +217,10 @@ def on_enough_masses(
 ) -> tuple[DesignQuestion, Assessment | None, float]:
     """Return a question on the masses that given parameters ask for, their loop and its growth.
 
-    Parameters
-    ----------
-    question, parameters
-        The question, and the structure's parameters by name.
-    assess
-        From a question and the law's parameters to the loop; None where no drag agrees with it.
-    finer
-        From the question to that on more masses.
-
-    Returns
-    -------
-    tuple
-        The question, the loop (None where it is not stable) and the largest real part of its poles
-        [1/s] with the drag before compensation.
+    The parameters are the structure's, by name.  `assess` leads from a question and the law's
+    parameters to the loop, None where no drag agrees with it; `finer` from the question to that on
+    more masses.  The loop returned is None where it is not stable; its growth is the largest real
+    part of its poles [1/s] with the drag before compensation.
     """
     values = question.values(parameters)
     growth = question.problem.growth(values)
@@ -265,11 +245,8 @@ def on_common_masses(
 ) -> list[tuple[DesignQuestion, Assessment | None, float]]:
     """Return the loops of a family on the masses that the most demanding of them asks for.
 
-    Parameters
-    ----------
-    looks
-        For each member, the case's own first: from the least number of masses to what
-        `on_enough_masses` returns.
+    For each member, the case's own first, a look leads from the least number of masses to what
+    `on_enough_masses` returns.
     """
     found: dict[int, tuple[DesignQuestion, Assessment | None, float]] = {}
     asked = dict.fromkeys(range(len(looks)), -1)

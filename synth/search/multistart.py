@@ -120,20 +120,11 @@ def search(
 ) -> Found:
     """Return the best answer of a multi-start search over a family.
 
-    Parameters
-    ----------
-    asked
-        The family, or one problem.
-    starts, seed
-        Size and seed of the search.
-    guesses
-        Searched parameters to start from before any that are drawn.
-    progress
-        Called as progress(stage, done, total).
-    only_guesses
-        Draw nothing: start from the guesses alone, if any of them is stable.
-    kept_only
-        Look for nothing else where no start arrives at an answer that keeps the limits.
+    `starts` and `seed` are its size and seed.  It begins with guesses of the searched
+    parameters before any that are drawn.  With `only_guesses` nothing is drawn: it starts from the
+    guesses alone, if any of them is stable.  With `kept_only` it looks for nothing else where no
+    start arrives at an answer that keeps the limits.  `progress` is called as progress(stage, done,
+    total).
     """
     tell = progress or (lambda stage, done, total: None)
     family = FamilyProblem.of(asked)

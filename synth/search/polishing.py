@@ -40,18 +40,11 @@ def stated(
     fine: bool = False,
     exact: bool = False,
 ) -> Programme:
-    """Return a programme on nodes that suit the loops at a point.
+    """Return a programme of a family on nodes that suit the loops at a point.
 
-    Parameters
-    ----------
-    asked, values, coefficients
-        The family, and where it stands: searched parameters, and coefficients of elements.
-    goal, reference, relaxed
-        As `Programme` takes them.
-    rough, fine
-        For four digits, or on nodes for eight.
-    exact
-        With margins held where they are measured.
+    The point is one of searched parameters, and of coefficients of elements.  Goal, reference and
+    relaxed limits are as `Programme` takes them.  The nodes are for four digits if `rough`, for
+    eight if `fine`; if `exact`, margins are held where they are measured.
     """
     family = FamilyProblem.of(asked)
     nodes, omega = [], []

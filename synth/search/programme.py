@@ -221,14 +221,9 @@ class Programme:
     ) -> Solution:
         """Return the answer that is reached from a start.
 
-        Parameters
-        ----------
-        start
-            The programme's vector, see `pack`.
-        reach
-            How far, relatively, a parameter may move.
-        tighten
-            Relative tightening of bounds by member and name of the limit.
+        The start is the programme's vector, see `pack`.  `reach` is how far, relatively, a
+        parameter may move; `tighten` the relative tightening of bounds by member and name of the
+        limit.
         """
         low, high = self._box(start, reach)
         found = descend(

@@ -108,20 +108,10 @@ def descend(
 ) -> Descent:
     """Return the point near a start where nothing gets better within the rows.
 
-    Parameters
-    ----------
-    evaluate
-        The programme at a vector (n,).
-    stable
-        Whether a vector may be evaluated.
-    start, low, high
-        Where to begin, and the ends of each variable, (n,).
-    logarithmic
-        Which variables are logarithms, of size one, (n,).
-    tolerance
-        Of the objective: what a step must promise to be taken.
-    most
-        Steps at most.
+    `evaluate` gives the programme at a vector (n,), and `stable` says whether it may be evaluated.
+    The start and the ends of each variable are (n,); so is `logarithmic`, which of them are
+    logarithms, of size one.  A step must promise more than `tolerance` of the objective to be
+    taken; there are at most `most`.
     """
     x = np.clip(start, low, high)
     prices, equation_prices = np.zeros(0), np.zeros(0)

@@ -39,18 +39,10 @@ _STEP = 1e-3  # of the logarithm of the motor's speed
 class LoopSlopes:
     """Slopes of a loop's figures in variables that are added one by one, and in its drag.
 
-    Parameters
-    ----------
-    fixed
-        The design on its case.
-    known
-        The coefficients of the elements in its loop, as `FixedDesign.known`.
-    drag, friction
-        The same as linear drag [N s/m] and friction of losses [N m s/rad].
-    outputs
-        The signals whose standard deviations are figures.
-    nodes
-        Nodes of all integrals.
+    `fixed` is the design on its case, and `known` the coefficients of the elements in its loop, as
+    `FixedDesign.known`; `drag` and `friction` are the same as linear drag [N s/m] and friction of
+    losses [N m s/rad].  The figures are the standard deviations of the outputs; all integrals have
+    the same nodes.
     """
 
     def __init__(

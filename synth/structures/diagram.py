@@ -39,18 +39,10 @@ class Branch:
 
 
 class DiagramLaw(ParametrisedController):
-    """The law of a diagram with one command.
+    """The law of a diagram with one command, the sum of its branches.
 
-    Parameters
-    ----------
-    plant
-        The plant; measurements that the diagram does not name are not heard.
-    branches
-        The diagram; the command is their sum.
-    gains
-        Parameters that the weights speak of.
-    bounds
-        Bounds that replace those of parameters, by name.
+    Measurements of the plant that the diagram does not name are not heard.  `gains` are the
+    parameters that the weights speak of; `bounds` replace those of parameters, by name.
     """
 
     def __init__(

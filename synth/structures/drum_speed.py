@@ -128,19 +128,10 @@ class DrumSpeedLoop:
         bandwidth: float | None = None,
         plant: Plant | None = None,
     ) -> DrumSpeedLoop:
-        """Return the loop of a case.
+        """Return the loop of a case, sampled every T [s].
 
-        Parameters
-        ----------
-        case
-            The case.
-        sample_time
-            T [s].
-        bandwidth
-            omega_b [rad/s]; by default that which the delays in the loop allow.  What the
-            motor has of itself is not taken away.
-        plant
-            The case's plant, if it is there already.
+        Its bandwidth omega_b [rad/s] is by default that which the delays in the loop allow; what
+        the motor has of itself is not taken away.  `plant` is the case's, if it is there already.
 
         Raises
         ------
@@ -184,15 +175,8 @@ class DrumSpeedLoop:
     ) -> tuple[ca.SX, ca.SX]:
         """Return (next state, command) for a wanted speed of the rope, symbols.
 
-        Parameters
-        ----------
-        state
-            (2, 1), see `initial`.
-        rope_speed
-            Wanted speed of the rope at the drum, positive hauling in [m/s]; cut to what the
-            motor can turn.
-        measured
-            What is measured, by name.
+        The state is (2, 1), see `initial`.  The speed is that wanted at the drum, positive hauling
+        in [m/s], and cut to what the motor can turn.  What is measured is by name.
         """
         wanted = self.motor.per_rope_speed * rope_speed
         wanted = ca.fmin(self.speed_limit, ca.fmax(-self.speed_limit, wanted))

@@ -338,16 +338,10 @@ class LowOrderLaw(ParametrisedController):
         sizes: FloatArray,
         dampings: FloatArray,
     ) -> None:
-        """Write the numbers of a controller with given poles that comes closest to a feedback.
+        """Write into `values` the controller with given poles that comes closest to a feedback.
 
-        Parameters
-        ----------
-        values
-            What is written to.
-        plant, feedback
-            Shaken by white noises of intensity 1, and u = K x.
-        sizes, dampings
-            Of the poles of each block [rad/s], [-].
+        The plant is shaken by white noises of intensity 1, the feedback is u = K x.  Sizes [rad/s]
+        and dampings [-] are those of the poles of each block.
         """
         # Every measurement through 1 and s over each block's denominator, beside the plant.
         filters = []
@@ -429,12 +423,9 @@ class LowOrderFeedback(Structure):
     ) -> list[float]:
         """Return the parameters of rolled-off payload feedback, and set the sizes by it.
 
-        Parameters
-        ----------
-        law
-            The law of this structure; its parameters get the sizes that go with the answer.
-        found, controller
-            Parameters and controller of ``payload-feedback-rolloff``, of order two.
+        The law is that of this structure: its parameters get the sizes that go with the answer.
+        `found` and `controller` are parameters and controller of ``payload-feedback-rolloff``, of
+        order two.
         """
         assert isinstance(law, LowOrderLaw)
         corner = found["rolloff.corner"]

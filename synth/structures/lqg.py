@@ -180,14 +180,9 @@ def whitened(plant: LinearPlant, disturbances: Sequence[Disturbance]) -> LinearP
 def shaped(plant: LinearPlant, sources: Mapping[str, ShapingFilter | float]) -> LinearPlant:
     """Return a plant that white noises of intensity 1 shake as the sources do.
 
-    Parameters
-    ----------
-    plant
-        Without delays.
-    sources
-        By name of a disturbance: a filter, or the intensity of white noise.  Disturbances that
-        are not named rest.  A white noise whose rate acts too has no finite variance and keeps
-        the rate out.
+    The plant has no delays.  A source is, by name of a disturbance, a filter, or the intensity of
+    white noise; disturbances that are not named rest.  A white noise whose rate acts too has no
+    finite variance and keeps the rate out.
     """
     n, count = len(plant.states), len(sources)
     extra = sum(s.order for s in sources.values() if isinstance(s, ShapingFilter))

@@ -27,15 +27,10 @@ _SHORTEST, _LONGEST = 1e-4, 10.0  # sample times [s]
 
 
 def make_recursion(initial: npt.ArrayLike, law: RecursiveLaw) -> Recursion:
-    """Return the recursion of a law.
+    """Return the recursion of a law, from the state before the first sample, (nxc,).
 
-    Parameters
-    ----------
-    initial
-        State before the first sample, (nxc,).
-    law
-        Called once, as law(state, measured) with symbols, `measured` by the names of
-        `HEARD`; returns the next state, (nxc, 1), and the command.
+    The law is called once, as law(state, measured) with symbols, `measured` by the names of
+    `HEARD`; it returns the next state, (nxc, 1), and the command.
     """
     start = np.atleast_1d(np.asarray(initial, dtype=np.float64))
     state, vector = ca.SX.sym("xc", start.size), ca.SX.sym("m", len(HEARD))

@@ -19,21 +19,12 @@ _SLOWEST = 0.5  # frequencies above which a controller's gains are compared [rad
 
 
 def sampled(controller: LinearController, sample_time: float) -> Matrices:
-    """Return (A, B, C, D) of a controller sampled every `sample_time` [s].
+    """Return (A, B, C, D) of a controller sampled every `sample_time` T [s].
 
-    By Tustin's rule, s = k (z - 1)/(z + 1) with k = 2/T.
+    By Tustin's rule, s = k (z - 1)/(z + 1) with k = 2/T.  The controller is x' = A x + B y, u = C x
+    + D y.
 
-    Parameters
-    ----------
-    controller
-        x' = A x + B y, u = C x + D y.
-    sample_time
-        T [s].
-
-    Raises
-    ------
-    InputError
-        If k is an eigenvalue of A.
+    Raises InputError if k is an eigenvalue of its A.
     """
     A, B, C, D = controller.A, controller.B, controller.C, controller.D
     n = len(A)
@@ -56,17 +47,10 @@ def tracking_gain(matrices: Matrices, sample_time: float) -> FloatArray:
     every controller whose lasting states reach its output.  The noise of each e is one that, on
     its own, moves u by one unit above 0.5 rad/s, and that of the drive's answer is one unit.
 
-    Parameters
-    ----------
-    matrices
-        A, B, C, D of the sampled controller, one output.
-    sample_time
-        T [s].
+    `matrices` are A, B, C, D of the controller with one output, sampled every `sample_time` [s].
 
-    Raises
-    ------
-    SynthesisError
-        If a state that does not decay is not seen at the output or not reached from e.
+    Raises SynthesisError if a state that does not decay is not seen at the output or not reached
+    from e.
     """
     A, B, C, D = matrices
     n = len(A)

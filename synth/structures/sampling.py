@@ -170,16 +170,8 @@ def sampled_loop(
 ) -> SampledLoop:
     """Return the loop of a recursion on the linearised plant of a case.
 
-    Parameters
-    ----------
-    case
-        For its sensors.
-    plant
-        Its plant.
-    recursion, sample_time
-        The controller, and its T [s].
-    drag
-        Linear drag of the payload [N s/m]; none is the harder test of stability.
+    The recursion is the controller, of sample time T [s]; the case gives the sensors.  `drag` is
+    the linear drag of the payload [N s/m]; none is the harder test of stability.
     """
     cell, waits = case.sensors.load_cell, case.winch.drive.command_delay
     sensed = with_sensors(plant.linearise(drag=drag), case.sensors, waits)

@@ -68,20 +68,12 @@ def structure_aboard(name: str, case: Case) -> PayloadFeedback | WinchStructure 
 
 
 def structure_named(name: str, case: Case) -> PayloadFeedback | WinchStructure | LowOrderFeedback:
-    """Return a structure for a case.
+    """Return a structure for a case, for its motor, drum, rope and gains.
 
-    Parameters
-    ----------
-    name
-        One of `structure_names`; ``low-order-n`` has any order n from 1 to 99, and
-        ``high-order`` hears all that is aboard, with as many states as it takes.
-    case
-        The case: its motor, drum, rope and gains.
+    The name is one of `structure_names`; ``low-order-n`` has any order n from 1 to 99, and
+    ``high-order`` hears all that is aboard, with as many states as it takes.
 
-    Raises
-    ------
-    InputError
-        If there is no structure of that name.
+    Raises InputError if there is no structure of that name.
     """
     if (order := _LOW_ORDER.match(name)) is not None:
         return LowOrderFeedback(order=int(order[1]))

@@ -102,21 +102,12 @@ def sweep_nodes(
     kinks: Sequence[float] = (),
     apart: bool = False,
 ) -> SweepNodes:
-    """Return nodes on panels of an axis.
+    """Return nodes on panels of an axis, for the density of the hook's motion, of omega [rad/s].
 
-    Parameters
-    ----------
-    axis, panels
-        The band, and its panels.
-    density
-        The density of the hook's motion, of omega [rad/s].
-    kinks
-        Kinks of that density [rad/s] that lie within panels.  They then stand in the weights
-        (product integration: what is integrated with the density is the polynomial through the
-        nodes), and panels need to be no shorter than the responses ask for.
-    apart
-        Whether the difference of the two rules on each panel is wanted instead of the shorter
-        rule, as many more rules.
+    Kinks of that density [rad/s] that lie within panels then stand in the weights (product
+    integration: what is integrated with the density is the polynomial through the nodes), and
+    panels need to be no shorter than the responses ask for.  `apart` is whether the difference of
+    the two rules on each panel is wanted instead of the shorter rule, as many more rules.
     """
     cuts = [axis.cut(complex(w)).real for w in kinks]
     omega, weights, sea = [], [], []

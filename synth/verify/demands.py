@@ -201,14 +201,8 @@ def limit_demand(limit: StatedLimit, enforced: bool = True) -> Demand:
 def case_demands(case: Case, data: PlantData, plant: LinearPlant, masses: int) -> dict[str, Demand]:
     """Return every limit that a case states, by name.
 
-    Parameters
-    ----------
-    case, data
-        The case and its plant's numbers.
-    plant
-        The design's plant, for the static values.
-    masses
-        Its rope masses; the roll-off begins beyond the modes that they hold.
+    The plant is the design's, for the static values; the roll-off begins beyond the modes that its
+    rope masses hold.
     """
     wanted, drive, winch = case.limits, case.winch.drive, case.winch
     found = [Demand(name="max_sensitivity", kind="max_sensitivity", bound=wanted.max_sensitivity)]

@@ -30,22 +30,13 @@ def integrate(
 ) -> FloatArray:
     """Return integrals over frequency, (m,).
 
-    Parameters
-    ----------
-    density
-        omega (k,) [rad/s] -> integrands (m, k).
-    edges
-        Panel edges, ascending [rad/s].
-    rtol
-        Accuracy relative to each integral.
-    tail_panels
-        If above zero, go on from the first edge to zero, and from the last to infinity in so
-        many panels of 1/omega: a few for a smooth tail, many for one that rings.
+    The density leads from omega (k,) [rad/s] to integrands (m, k); `edges` are those of panels,
+    ascending [rad/s]; the accuracy `rtol` is relative to each integral.  If `tail_panels` is above
+    zero, it goes on from the first edge to zero, and from the last to infinity in so many panels of
+    1/omega: a few for a smooth tail, many for one that rings.
 
-    Raises
-    ------
-    SolverError
-        If it does not converge: the integral does not exist, or an integrand is wild.
+    Raises SolverError if it does not converge: the integral does not exist, or an integrand is
+    wild.
     """
     half_line = tail_panels > 0
     start = np.append(0.0, edges[:-1]) if half_line else edges[:-1]
@@ -107,16 +98,8 @@ def panels(
 ) -> FloatArray:
     """Return panel edges [rad/s]: even in log-frequency, at the kinks, denser near poles.
 
-    Parameters
-    ----------
-    low, high
-        Band [rad/s].
-    splits
-        Kinks [rad/s].
-    marks
-        Poles [1/s]; no panel is longer than twice its distance from one.
-    longest
-        Length that no panel exceeds [rad/s].
+    Band, kinks (`splits`) and the length that no panel exceeds are in rad/s; `marks` are poles
+    [1/s], and no panel is longer than twice its distance from one.
     """
     count = int(np.ceil(_PANELS_PER_DECADE * np.log10(high / low))) + 1
     kinks = np.asarray(splits, dtype=np.float64)

@@ -49,21 +49,12 @@ class CurveMargins:
 
 
 class Curve:
-    """The curve 1 + L(i omega) from `low` to `high`.
+    """The curve 1 + L(i omega) from `low` to `high` [rad/s].
 
-    Parameters
-    ----------
-    difference
-        1 + L as a function of s [1/s].
-    marks
-        Poles [1/s] near which it turns quickly.
-    low, high
-        Ends [rad/s].
+    `difference` is 1 + L as a function of s [1/s]; `marks` are poles [1/s] near which it turns
+    quickly.
 
-    Raises
-    ------
-    SolverError
-        If its phase cannot be followed.
+    Raises SolverError if its phase cannot be followed.
     """
 
     def __init__(self, difference: Function, marks: ComplexArray, low: float, high: float) -> None:

@@ -49,14 +49,8 @@ def looked_at(steps: Mapping[str, Callable[[], list[Check]]], on: str) -> Verifi
 def winding_of_plant(plant: LinearPlant, law: LawMatrices, marks: npt.ArrayLike = ()) -> Winding:
     """Count the unstable poles of a loop on a linear plant, delays exact.
 
-    Parameters
-    ----------
-    plant
-        The plant.
-    law
-        The controller around it, u = +C y.
-    marks
-        Further points [1/s] near which the loop is lively, such as its closed-loop poles.
+    The law is that of the controller around the plant, u = +C y.  `marks` are further points [1/s]
+    near which the loop is lively, such as its closed-loop poles.
     """
     poles = np.concatenate([open_loop_poles(plant.A), open_loop_poles(law.A)])
     loop = Loop(plant=plant, law=law, marks=poles)

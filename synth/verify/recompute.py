@@ -273,20 +273,11 @@ def lyapunov_variances(
 ) -> dict[str, float]:
     """Return the variance of every output from a Lyapunov equation; the loop must be stable.
 
-    Parameters
-    ----------
-    plant
-        The plant, its delays replaced by rational models.
-    law
-        The controller.
-    sources
-        By name of a disturbance: a shaping filter, or the intensity of white noise.  Infinite
-        variances (white noise straight through to an output) come out as infinity.
+    The plant's delays are replaced by rational models, and the law is the controller's.  A source
+    is, by name of a disturbance, a shaping filter, or the intensity of white noise.  Infinite
+    variances (white noise straight through to an output) come out as infinity.
 
-    Raises
-    ------
-    SolverError
-        If a disturbance is white and the plant wants its rate as well.
+    Raises SolverError if a disturbance is white and the plant wants its rate as well.
     """
     A, E, Cz, Fz = closed_matrices(plant, law)
     noise = len(sources)

@@ -39,15 +39,8 @@ _SAME = 1e-9  # controller from the parameters against the controller
 def verify_tuning(tuning: TuningClaims) -> Verification:
     """Check an answer of `synth.design.tune` by code that the optimiser did not use.
 
-    Parameters
-    ----------
-    tuning
-        The answer, with the question it answers.
-
-    Returns
-    -------
-    Verification
-        `ok` only if the closed loop is stable with the exact delays and every claim was met.
+    The answer comes with the question it answers.  The verification is `ok` only if the closed loop
+    is stable with the exact delays and every claim was met.
     """
     if tuning.controller is None:
         return Verification.of([failure("controller", "there is none")], "")

@@ -73,15 +73,7 @@ _ROPE_PER_DECADE = 200  # first points of the contour on a rope with modes that 
 def verify_design(design: DesignClaims) -> Verification:
     """Check the design of a winch by code that the optimiser did not use.
 
-    Parameters
-    ----------
-    design
-        The design, with its claims.
-
-    Returns
-    -------
-    Verification
-        `ok` only if the loop is stable on every model and every claim was met.
+    The verification is `ok` only if the loop is stable on every model and every claim was met.
     """
     winch = _Winch(design)
     steps = {
@@ -421,14 +413,7 @@ def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, f
     Displacement and tension go up from the payload by transfer matrices: slings (1, 1/k), hook
     block (m s^2, 1), rope and the crane's tip (1, 1/k).
 
-    Parameters
-    ----------
-    data
-        The plant's numbers.
-    source
-        The hook's motion.
-    drag
-        Drag coefficient [N s/m].
+    The source is the hook's motion; the drag coefficient is in N s/m.
     """
     if source.band is None:
         raise SolverError("verification: the hook's motion has no band")
