@@ -3,8 +3,8 @@
     Family -> starts -> rough descents -> places -> starts far about the best -> more places
            -> descents to the end -> distinct answers -> polished -> Found
 
-A single plant is a family of one.  The first descents stop once three of them, and most, come by
-one place; what they all miss is looked for about the best, until three come back to one as good.
+A single plant is a family of one.  The first descents stop once four of them, and most, come by
+one place; what they all miss is looked for about the best, until four come back to one as good.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from .starts import begin_points, briskest, others_of, scattered, start_coeffici
 Progress = Callable[[str, int, int], None]
 
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
-_LEAST = 6  # starts that are drawn at least, however many agree before
-_ENOUGH, _MOST = 3, 0.6  # starts, and share of all, that come by one place: no more are needed
+_LEAST = 8  # starts that are drawn at least, however many agree before
+_ENOUGH, _MOST = 4, 0.6  # starts, and share of all, that come by one place: no more are needed
 _SCATTER, _MOST_SCATTER, _HOPS = 2, 12, 3  # starts about the best, by parameter; most; how often
 _AS_GOOD = 5e-3  # of the log cost, by which rough answers may differ that are as good
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end

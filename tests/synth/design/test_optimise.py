@@ -191,7 +191,8 @@ def test_a_limit_that_binds_on_a_rope_mode_is_kept_on_the_distributed_rope() -> 
 
 @pytest.mark.ci
 def test_a_margin_holds_a_reserve_where_no_number_of_masses_is_enough() -> None:
-    case = models.load_case("subsea-crane").replace({"sensors.telemetry.delay": 0.4})
+    late = {"sensors.telemetry.delay": 0.4, "rope.damping_law": "kelvin-voigt"}
+    case = models.load_case("subsea-crane").replace(late)
     design = optimise_gains(case, "payload-feedback", starts=4)
     assert design.ok
     assert design.margins is not None
