@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -603,9 +604,11 @@ main_thread = pytest.mark.skipif(
 @main_thread
 def test_ctrl_c_in_the_midst_of_the_search(tmp_path):
     started = subprocess.Popen(
-        # every structure of the crane: a search of some twenty seconds
+        # every structure of the crane: a search of some minutes
         [sys.executable, "-m", "stillhook", "optimise", "subsea-crane"],
         cwd=tmp_path,
+        # A shell in the background hands on that interrupts are ignored.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
