@@ -44,14 +44,14 @@ CASE = "subsea-crane"
 #: rope: all solve the question without.
 PLAIN = {"winch.losses": "hauling", "rope.damping_law": "kelvin-voigt"}
 #: Ends of the box that differential evolution searches: both signs of what has no sign of its own,
-#: three to fifteen times the optimum; what lies between two numbers, between these.
+#: one and a half to fifteen times the optimum; what lies between two numbers, between these.
 BOXES: Mapping[str, FloatArray] = {
     "payload-feedback": np.array([[-100.0, 100.0], [-300.0, 300.0], [-100.0, 100.0]]),
     "combined": np.array(
         [
-            [-40.0, 40.0],
-            [-60.0, 60.0],
-            [-150.0, 150.0],
+            [-80.0, 80.0],
+            [-80.0, 80.0],
+            [-200.0, 200.0],
             [1e-3, 7.5],
             [0.0, 2.0],
             [1.0, 500.0],
