@@ -8,7 +8,7 @@ the largest sea that can, and the status names the limit that breaks first and w
 have to be.  A design that fails its independent check is not ok, whatever the search said.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
@@ -20,7 +20,7 @@ from models.basics import InputError, check_range, digits_apart, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
 
-from ..loop import Assessment
+from ..loop import Assessment, Coefficients
 from ..question import (
     GAINS,
     PAYLOAD,
@@ -28,6 +28,7 @@ from ..question import (
     FamilyProblem,
     Objective,
     PosedFamily,
+    Values,
     least_damping_text,
     on_common_masses,
     on_enough_masses,
@@ -35,7 +36,7 @@ from ..question import (
     pose_family,
     with_masses,
 )
-from ..search import KEPT, Found, Progress, hardest, polish, search, with_bests
+from ..search import KEPT, Found, Progress, Solution, glanced, hardest, polish, search, with_bests
 from ..structures import LowOrderFeedback, structures_aboard
 from .design import SWITCHING_LOSS, Design
 from .high_order import high_order_gains
@@ -212,41 +213,56 @@ def _on_the_rope(
     seed: int,
     progress: Progress | None,
 ) -> tuple[PosedFamily, Tuning]:
-    """Return the answer on the masses that it asks for itself, nothing in reserve.
+    """Return the answer on masses on which it keeps the limits where `evaluate_gains` looks at it.
 
-    On the way there limits hold a reserve for the distributed rope instead of more masses; at the
-    end only where no more masses are to be had.
+    Limits hold a reserve for the distributed rope only where no more masses are to be had.
     """
     damped = tuning.status.startswith(_NO_DESIGN)
-    for _ in range(ROUNDS):
-        fitted = _fitted(posed, tuning)
-        if fitted is posed:
-            break
-        # The ends of the search are the guesses.
-        posed, tuning = fitted, _again(fitted.problem, tuning, starts, seed, progress)
-    least = 0  # what asked for more on the way may be gone
+    least = 0  # what asked for more masses on the way may be gone
     for _ in range(ROUNDS):
         if not tuning.ok:
             break
-        least = max(least, _masses_of(given, tuning))
-        told = given.on(least)
-        if least == posed.masses and (least == MAX_MASSES or not posed.reserves):
-            told = _fitted(posed, tuning)
-            if told is posed or least < MAX_MASSES:
+        if posed.masses < MAX_MASSES:
+            solved = tuning.found.solved
+            assert solved is not None
+            stands, masses = seen_at(given, solved)
+            least = max(least, masses)
+            told = posed if stands and least <= posed.masses else given.on(least)
+            if told.masses == posed.masses:
                 break
+        elif (told := _fitted(posed, tuning)) is posed:
+            break
         posed, tuning = told, _again(told.problem, tuning, starts, seed, progress)
     if damped and not tuning.ok:
         tuning = replace(tuning, status=_damped_too_little(posed, tuning))
     return posed, tuning
 
 
-def _masses_of(posed: PosedFamily, tuning: Tuning) -> int:
-    """Return the masses on which `evaluate_gains` looks at an answer."""
-    solved = tuning.found.solved
-    assert solved is not None
+def seen_at(posed: PosedFamily, solved: Solution) -> tuple[bool, int]:
+    """Return whether an answer keeps the limits where `evaluate_gains` looks at it, on what masses.
+
+    They are those that the answer asks for, whatever masses it was found on.
+    """
     parameters = posed.first.named([float(v) for v in solved.values])
-    looks = [partial(_looked_at, question, parameters) for question in posed.questions]
-    return max(question.masses for question, _, _ in on_common_masses(looks))
+
+    def look(
+        question: DesignQuestion, start: Coefficients, masses: int
+    ) -> tuple[DesignQuestion, Assessment | None, float]:
+        return _looked_at(
+            question,
+            parameters,
+            masses,
+            lambda asked, values: glanced(asked.problem, values, start=start),
+        )
+
+    pairs = zip(posed.questions, solved.coefficients, strict=True)
+    seen = on_common_masses([partial(look, *pair) for pair in pairs])
+    stands = all(
+        loop is not None
+        and all(limit.use(limit.worst(loop)) <= 1.0 + KEPT for limit in question.limits)
+        for question, loop, _ in seen
+    )
+    return stands, max(question.masses for question, _, _ in seen)
 
 
 def _fitted(posed: PosedFamily, tuning: Tuning) -> PosedFamily:
@@ -305,15 +321,20 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
     return verified(together(designs, posed), None)
 
 
+def _assessed(question: DesignQuestion, values: Values) -> Assessment:
+    return question.problem.assess(values)
+
+
 def _looked_at(
-    question: DesignQuestion, parameters: Mapping[str, float], masses: int
+    question: DesignQuestion,
+    parameters: Mapping[str, float],
+    masses: int,
+    assess: Callable[[DesignQuestion, Values], Assessment | None] = _assessed,
 ) -> tuple[DesignQuestion, Assessment | None, float]:
     """Return a question on the masses that given parameters ask for, and their loop in it."""
     if question.masses < masses and question.data.masses is None:
         question = with_masses(question, masses)
-    return on_enough_masses(
-        question, parameters, lambda posed, values: posed.problem.assess(values)
-    )
+    return on_enough_masses(question, parameters, assess)
 
 
 def evaluated(

@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, InputError, Quadrature, SolverError, one_thread
+from models.basics import ComplexArray, FloatArray, InputError, one_thread
 from models.case import Case
 from models.plant import MAX_MASSES
 
-from ..loop import Assessment, Coefficients, consistent_coefficients
+from ..loop import Assessment, Coefficients
 from ..question import (
     HOOK,
     PAYLOAD,
@@ -36,11 +36,9 @@ from ..question import (
     pose_family,
     with_masses,
 )
-from ..search import KEPT, Solution, cost_nodes, margin_nodes, settle, with_bests
+from ..search import KEPT, Solution, glanced, settle, with_bests
 from .design import Design
-from .optimise import ROUNDS, checked_parameters, evaluated, together, verified
-
-_PER_DECADE = 40  # margin frequencies; peaks and crossings between them are refined
+from .optimise import ROUNDS, checked_parameters, evaluated, seen_at, together, verified
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -172,19 +170,21 @@ class View:
         posed = replace(self.posed, questions=tuple(questions))
         reference = np.array(posed.first.values(parameters))
         solved, ended = self._descent(posed, reference, reference, begin)
-        least = 0  # masses that `evaluate` asks for there; until then limits may hold a reserve
+        least = 0
         for _ in range(ROUNDS):
-            # What a descent arrives at may ask for more, or for less, than where it began.
+            # What a descent arrives at may ask for more masses, or for less, than where it began.
             if ended is None:
                 break
-            fitted = posed if 0 < least < MAX_MASSES else posed.fitted(ended)
-            if fitted is posed:
-                there = posed.first.named([float(v) for v in solved.values])
-                looks = on_common_masses([partial(one.loop, there) for one in self._members])
-                least = max([least, *(question.masses for question, _, _ in looks)])
+            if posed.masses == MAX_MASSES:
+                fitted = posed.fitted(ended)
+            else:
+                stands, masses = seen_at(self.posed, solved)
+                least = max(least, masses)
                 fitted = self.posed.on(least)
-                if least == posed.masses and (least == MAX_MASSES or not posed.reserves):
+                if (stands and least <= posed.masses) or fitted.masses == posed.masses:
                     break
+            if fitted is posed:
+                break
             again = self._assessed(fitted, reference)
             if again is None:
                 break
@@ -288,31 +288,11 @@ class _Member:
     def assessed(
         self, question: DesignQuestion, values: Values, coefficients: Coefficients | None = None
     ) -> Assessment | None:
-        """Return a loop on nodes that are made from its poles; None where no drag agrees with it.
-
-        The coefficients begin where the last ones agreed.
-        """
-        problem = question.problem
-        controller = problem.law.controller([float(v) for v in values])
-        loop = problem.plant, controller, problem.disturbances
-        last: list[Quadrature] = []
-
-        def nodes(poles: ComplexArray) -> Quadrature:
-            last.append(cost_nodes(problem, poles))
-            return last[-1]
-
-        if problem.elements and coefficients is None:
-            try:
-                coefficients = self.begin = consistent_coefficients(
-                    *loop, problem.elements, start=self.begin, nodes=nodes
-                )
-            except SolverError:
-                return None
-        grid = partial(margin_nodes, problem, per_decade=_PER_DECADE)
-        same = (lambda _: last[-1]) if last else nodes  # what coefficients were found on does
-        return Assessment(
-            *loop, elements=problem.elements, coefficients=coefficients, nodes=same, grid=grid
-        )
+        """Return a loop at a glance, from where coefficients agreed last; see `glanced`."""
+        loop = glanced(question.problem, values, coefficients, self.begin)
+        if loop is not None and coefficients is None:
+            self.begin = loop.coefficients
+        return loop
 
 
 def _look(

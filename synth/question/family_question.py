@@ -141,10 +141,6 @@ class PosedFamily:
             loops.append(FamilyLoop(name=name, problem=problem))
         return FamilyProblem(scenarios=tuple(loops), objective=self.objective)
 
-    def masses_wanted(self, assessments: Sequence[Assessment]) -> int:
-        """Return the rope masses that the most demanding loop of any member asks for."""
-        return max(self.masses, _masses_wanted(self.questions, assessments))
-
     def fitted(self, assessments: Sequence[Assessment]) -> PosedFamily:
         """Return the family on the masses, with the reserves, that its loops ask for; or itself."""
         each = zip(self.questions, assessments, strict=True)

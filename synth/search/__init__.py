@@ -11,7 +11,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .multistart import Found, Progress, Start, least_violation, search, with_bests
-    from .nodes import cost_nodes, margin_nodes
+    from .nodes import cost_nodes, glanced, margin_nodes
     from .polishing import KEPT, assess, polish, settle, stated
     from .programme import Programme, Solution
     from .starts import begin_points, briskest, hardest, start_coefficients

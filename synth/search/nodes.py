@@ -1,17 +1,25 @@
 """Frequency nodes of a programme: quadrature for its variances, a grid for its margins."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, Quadrature, spectral_nodes
+from models.basics import ComplexArray, FloatArray, Quadrature, SolverError, spectral_nodes
 
-from ..loop import frequency_grid, integration_band
-from ..question import Problem
+from ..loop import (
+    Assessment,
+    Coefficients,
+    consistent_coefficients,
+    frequency_grid,
+    integration_band,
+)
+from ..question import Problem, Values
 
 _SLOW_SIDE = 8  # nodes per decade below everything that moves
 _FAST_SIDE = 24  # ... and above it, where a loop may cross over narrowly with the wrong gains
 _INSIDE = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # nodes about the edge of a limit's band
+_GLANCED_PER_DECADE = 40  # margin frequencies; peaks and crossings between them are refined
 _AT_ZERO = 1e-9  # relative size of a pole at zero, which no panel need shrink towards
 _ON_AXIS = 1e-9  # relative distance of a pole from the axis below which no node can resolve it
 _PANELS = {"rough": (4, 2.0), "coarse": (6, 3.0), "fine": (10, 4.0)}
@@ -62,6 +70,38 @@ def margin_nodes(problem: Problem, poles: ComplexArray, per_decade: int) -> Floa
     edges = [share * e for limit in problem.limits for e in limit.edges for share in _INSIDE]
     nodes = np.unique(np.concatenate([slow, dense, fast, near[near > 0.0], edges]))
     return problem.plant.beside_poles(nodes)
+
+
+def glanced(
+    problem: Problem,
+    values: Values,
+    coefficients: Coefficients | None = None,
+    start: Coefficients | None = None,
+) -> Assessment | None:
+    """Return a loop on nodes that are made from its poles; None where no drag agrees with it.
+
+    Where no coefficients of the elements are given they are solved for, from `start`.
+    """
+    controller = problem.law.controller([float(v) for v in values])
+    loop = problem.plant, controller, problem.disturbances
+    last: list[Quadrature] = []
+
+    def nodes(poles: ComplexArray) -> Quadrature:
+        last.append(cost_nodes(problem, poles))
+        return last[-1]
+
+    if problem.elements and coefficients is None:
+        try:
+            coefficients = consistent_coefficients(
+                *loop, problem.elements, start=start, nodes=nodes
+            )
+        except SolverError:
+            return None
+    same = (lambda _: last[-1]) if last else nodes  # what coefficients were found on does
+    grid = partial(margin_nodes, problem, per_decade=_GLANCED_PER_DECADE)
+    return Assessment(
+        *loop, elements=problem.elements, coefficients=coefficients, nodes=same, grid=grid
+    )
 
 
 def around(values: Sequence[ComplexArray]) -> ComplexArray:
