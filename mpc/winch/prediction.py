@@ -35,7 +35,14 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from models.basics import FloatArray, ReadOnlyArrays, SolverError, check_range, read_only
+from models.basics import (
+    FloatArray,
+    ReadOnlyArrays,
+    SolverError,
+    check_range,
+    read_only,
+    solve_discrete_lyapunov,
+)
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter, noisy_hold, root_of
@@ -397,8 +404,12 @@ def _scales(model: PredictionModel) -> FloatArray:
     for k, name in enumerate(model.winch.plant.states):
         if not model.winch.moved[k].any():
             sizes[k] = by_signal.get(name.rsplit(".", 1)[-1], heave)
-    added = np.sqrt(np.diag(model.G @ model.G.T)[w : w + model.errors])
-    sizes[w : w + model.errors] = np.where(added > 0.0, added, 1.0)
+    # What one sample adds to an error is next to nothing in a filter's displacement.
+    error = slice(w, w + model.errors)
+    lasting = solve_discrete_lyapunov(model.A[error, error], (model.G @ model.G.T)[error, error])
+    assert lasting is not None
+    rms = np.sqrt(np.diag(lasting))
+    sizes[error] = np.where(rms > 0.0, rms, 1.0)
     sizes[model.constants_at] = [0.1 * force, 0.1 * torque, 0.1 * _GRAVITY, 0.1 * force]
     for name in LATE:
         at = slice(model.first[name], model.first[name] + model.depth[name])

@@ -9,6 +9,7 @@ import scipy.linalg
 from mpc_cases import WEIGHTS, case_of
 from scipy.integrate import solve_ivp
 
+import models
 from models import SolverError
 from models.hook import HookMotion
 from models.plant import build_plant, hermite_hold, noisy_hold, root_of
@@ -267,6 +268,20 @@ def test_tuned_weights_are_stable_on_every_plant_that_they_have_to_get_along_wit
     first = with_noise(prediction_model(sampled_winch(case)), WEIGHTS["thesis-1975"].noise)
     begun = Unsaturated(model=first, regulator=regulator(first, 0.1))
     assert weights.payload_rms[0] < begun.rms_under(prediction_model(sampled_winch(case)))[0]
+
+
+def test_states_are_measured_by_what_they_are_known_to_be_at_most():
+    """A scale far below a state's own size leaves nothing of the Riccati equation's digits."""
+    # A reference unit as its maker states it has errors to which a sample adds next to nothing.
+    for case in (models.load_case("subsea-crane"), *map(case_of, NAMES)):
+        model = prediction_model(sampled_winch(case, sample_time=0.05))
+        assert np.all(np.sqrt(np.diag(kalman_covariance(model))) < 3.0 * model.scale)
+
+
+def test_the_bundled_crane_of_today_can_be_tuned():
+    """The equation of its filter had no solution on some machines."""
+    model = prediction_model(sampled_winch(models.load_case("subsea-crane"), sample_time=0.05))
+    assert not saturates(model)
 
 
 def test_a_drive_saturates_where_the_sea_asks_for_more_than_its_peak():
