@@ -23,6 +23,7 @@ SCRIPTS: Mapping[str, str] = {
     "headline.csv": "docs/make/headline.py",
     "holds.csv": "docs/make/holds.py",
     "landing.csv": "docs/make/landing.py",
+    "landing_designs.csv": "docs/make/landing.py",
     "mpc_solvers.csv": "benchmarks/mpc_speed.py",
     "mpc_steps.csv": "benchmarks/mpc_speed.py",
     "pareto.csv": "docs/make/robust.py",

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
+import landing
+import landing_page
 import numpy as np
 import pytest
+from stored import read_rows
 
 import stillhook as sh
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "make"))
-try:
-    import landing
-finally:
-    sys.path.pop(0)
+from models.operation import scenario_named
 
 NAMES = (*landing.CONTROLLERS, *landing.LIMITS)
 
@@ -25,31 +21,53 @@ def rows():
     return landing.load()
 
 
-def test_complete(rows):
+@pytest.fixture(scope="module")
+def designs():
+    return read_rows(landing.DESIGNS)
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return scenario_named("landing", sh.load_case("landing"))
+
+
+def test_complete(rows, designs):
     expected = [(name, seed) for name in NAMES for seed in range(landing.SEEDS)]
     assert [(row["controller"], row["seed"]) for row in rows] == expected
-    columns = "controller seed within rms largest touchdown_speed bounce slack_events snap_load"
-    assert list(rows[0]) == [*columns.split(), "least_haul"]
+    columns = "controller seed within rms largest touchdown_speed bounce lifted touchdowns hardest"
+    assert list(rows[0]) == [*columns.split(), "slack_events", "snap_load", "end_haul"]
+    structures = "payload-feedback payload-feedback-rolloff drum-feedback feed-forward combined"
+    assert [row["structure"] for row in designs] == structures.split()
 
 
 def columns_of(table):
     return [cell.strip() for cell in table.splitlines()[0].strip("|").split("|")]
 
 
-def test_columns_of_the_tables(rows):
-    assert columns_of(landing.held_table(rows, landing.CONTROLLERS)) == [
+def test_columns_of_the_tables(rows, designs, scenario):
+    assert columns_of(landing_page.held_table(rows, landing.CONTROLLERS)) == [
         "controller",
         "time within 4 cm [%]",
         "rms [mm]",
         "largest [mm]",
         "never beyond 4 cm",
     ]
-    landed = landing.landed_table(rows)
+    assert columns_of(landing_page.designs_table(rows, designs)) == [
+        "structure",
+        "ok",
+        "by design, rms [mm]",
+        "simulated, rms [mm]",
+        "what binds",
+    ]
+    landed = landing_page.landed_table(rows, scenario)
     assert columns_of(landed) == [
         "controller",
         "touchdown speed [mm/s]",
         "fastest [mm/s]",
         "off again [mm]",
+        "rope beyond what is asked [m]",
+        "lifted on the brake",
+        "hardest [mm/s]",
         "slack events",
         "runs with a snap",
         "largest snap load [kN]",
@@ -57,7 +75,11 @@ def test_columns_of_the_tables(rows):
     assert "| none |" not in landed  # a closed brake does not land
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    # The weights of predictive control are tuned anew: half a minute.
+    [pytest.param(name, marks=pytest.mark.ci) if "mpc" in name else name for name in NAMES],
+)
 def test_two_seeds_again(rows, name):
     stored = [row for row in rows if row["controller"] == name]
     for now in landing.rows_of(name, [0, 7]):
@@ -84,35 +106,93 @@ def test_numbers_of_a_run_by_hand():
     assert found["touchdown_speed"] == pytest.approx(-run["payload.velocity"][first], rel=0.05)
 
 
-def test_what_the_page_says(rows):
-    def mm(name, number="rms"):
-        return 1e3 * landing.mean(rows, name, number).mean
+def test_a_module_is_lifted_on_the_brake_or_before():
+    runs = landing.runs_of("constant-tension", [1])
+    (run,) = runs
+    found = landing.numbers(run, runs.scenario)
+    landed = run.time > run.time[np.argmax(run["contact.gap"] <= 0.0)]
+    before = run.time <= runs.scenario.disengage_at
+    assert found["bounce"] == run["contact.gap"][landed & before].max() > 0.1
+    assert found["lifted"] == run["contact.gap"][~before].max() > 0.1
+    assert found["touchdowns"] > 1.0
+    assert found["hardest"] >= found["touchdown_speed"]
+    assert found["end_haul"] == run["drum.haul"][-1]
 
-    # "None of them keeps within 4 cm", "the feedback comes closest".
-    for name in landing.CONTROLLERS:
-        assert max(landing.values(rows, name, "largest")) > landing.TOLERANCE
-        assert mm("feedback") <= mm(name)
-    # "With perfect sensors the module moves as much."
-    assert mm("feedback, perfect sensors") == pytest.approx(mm("feedback"), rel=0.02)
+
+def rows_with(rows, controller, **changed):
+    """Return the rows, other numbers in each of a controller's."""
+    return [row | changed if row["controller"] == controller else row for row in rows]
+
+
+def test_who_keeps_within_the_tolerance_is_read_from_the_rows(rows):
+    assert landing_page.keepers(rows) == ["mpc"]
+    assert "**Within 4 cm all the time, in every run: `mpc`.**" in landing_page.verdict(rows)
+    worse = rows_with(rows, "mpc", largest=0.041)
+    assert landing_page.keepers(worse) == []
+    assert "**None of them keeps within 4 cm** all the time." in landing_page.verdict(worse)
+    still = rows_with(rows, "none", rms=1e-3, largest=2e-3)
+    told = landing_page.verdict(still)
+    assert "in every run: `mpc`, `none`.**" in told
+    assert "`none` is the stillest with 1.0 mm rms and at most 2 mm. Next is `mpc` with" in told
+
+
+def test_more_or_less_rope_is_read_from_the_rows(rows, designs):
+    more = rows_with(rows, "mpc", end_haul=-10.2)
+    assert "1.0 m more rope out than it is asked for" in " ".join(
+        landing_page.page(more, designs).split()
+    )
+
+
+def test_what_the_page_says(rows, designs, scenario):
+    def mm(name):
+        return 1e3 * landing.mean(rows, name, "rms").mean
+
+    def beyond(name):
+        return landing_page.beyond(rows, name, scenario)
+
+    # Who is still, in this order: predictive, both together, feedback, feed-forward.
+    assert landing_page.by_stillness(rows)[:2] == ["mpc", "combined"]
+    assert mm("combined") < 0.5 * mm("drum-feedback")
+    assert mm("mpc-ar") > mm("feed-forward")  # less than three minutes to learn the sea
+    # "sh.optimise_gains answers with"; the others are ok too, though one does next to nothing.
+    assert designs[-1]["structure"] == "combined"
+    assert all(row["ok"] == "yes" for row in designs)
+    assert mm("payload-feedback") > 0.9 * mm("lowered without compensation")
+    # What a design promises is simulated: 20 runs of 100 s are within 3 %.
+    for row in designs:
+        name = row["structure"].replace("feed-forward", "feed-forward, designed")
+        assert mm(name) == pytest.approx(1e3 * float(row["payload_rms"]), rel=0.03)
+    # "Payload feedback is limited by its own loop": better sensors do not help.
+    perfect = "payload-feedback-rolloff, perfect payload sensors"
+    assert mm(perfect) == pytest.approx(mm("payload-feedback-rolloff"), rel=0.02)
+    assert mm("combined, perfect MRU") < mm("combined, perfect payload sensors") < mm("combined")
     # Feed-forward: the share alone, the MRU alone, and without both.
     assert mm("feed-forward of 0.9, perfect MRU") == pytest.approx(36.0, abs=1.0)
     assert mm("feed-forward of 1") > 5.0 * mm("feed-forward of 1, perfect MRU")
-    assert max(landing.values(rows, "feed-forward of 1 with lead, perfect MRU", "largest")) <= (
-        landing.TOLERANCE
-    )
-    assert max(landing.values(rows, "feed-forward of 1, MRU of 1 cm", "largest")) > 0.04
+    assert mm("feed-forward of 1, MRU that drifts by 5 cm") < 0.8 * mm("feed-forward of 1")
+    with_lead = "feed-forward of 1 with lead, perfect MRU"
+    assert landing_page.inside(rows, with_lead) == "20 of 20"
+    assert landing_page.inside(rows, "feed-forward of 1, MRU of 1 cm") != "20 of 20"
     assert mm("feed-forward-lead") > mm("feed-forward")
     # "Constant tension does nothing."
     assert mm("constant-tension") == pytest.approx(mm("lowered without compensation"), rel=0.05)
-    # Payload feedback pays out rope that nobody asked for.
-    assert max(landing.values(rows, "feedback", "least_haul")) < -20.0
-    assert min(landing.values(rows, "feed-forward", "least_haul")) > -10.5
+    # Feedback pays out rope that nobody asked for, and MPC holds some back: it is lifted again.
+    assert beyond("combined") > 5.0
+    assert beyond("payload-feedback-rolloff") > beyond("combined")
+    assert beyond("mpc") < -0.5
+    assert abs(beyond("feed-forward")) < 0.5
+    assert np.median(landing.values(rows, "mpc", "lifted")) > 0.3
+    assert landing_page.lifted(rows, "combined") == "0 of 20"
+    assert landing.mean(rows, "mpc", "slack_events").mean > 20.0
+    assert max(landing.values(rows, "mpc", "touchdown_speed")) < 0.2
+    assert max(landing.values(rows, "mpc", "hardest")) > 1.0
     assert all(math.isnan(v) for v in landing.values(rows, "none", "touchdown_speed"))
 
 
-def test_the_page_shows_these_rows(rows):
-    assert landing.PAGE.read_text(encoding="utf-8") == landing.page(rows)
-    assert landing.FIGURE.exists()
+def test_the_page_shows_these_rows(rows, designs):
+    told = landing_page.PAGE.read_text(encoding="utf-8")
+    assert told == landing_page.page(rows, designs)
+    assert landing_page.FIGURE.exists()
 
 
 def test_asking_for_a_row_that_is_not_there(rows):
@@ -120,13 +200,17 @@ def test_asking_for_a_row_that_is_not_there(rows):
         landing.mean(rows, "autopilot", "rms")
 
 
+def test_stored_designs_are_ok_with_what_they_promise(designs):
+    case = sh.load_case("landing")
+    row = designs[-1]
+    again = sh.evaluate_gains(case, landing.parameters_of(row), row["structure"])
+    assert again.ok, again.status
+    assert again.payload_rms == pytest.approx(float(row["payload_rms"]), rel=1e-5)
+
+
 @pytest.mark.slow
-def test_the_gains_are_the_optimum_and_the_margins_what_the_page_says():
-    case = sh.load_case("landing").replace(landing.LAW)
-    design = sh.optimise_gains(case, "payload-feedback")
-    assert dict(design.gains) == pytest.approx(landing.GAINS, rel=2e-3)
-    assert "max_sensitivity, gain_margin_down bind" in design.status
-    stored = 1e3 * landing.mean(landing.load(), "feedback", "rms").mean
-    assert 1e3 * design.payload_rms == pytest.approx(stored, rel=0.05)
-    prompt = sh.evaluate_gains(case.replace({"sensors.telemetry.delay": 0.0}), landing.GAINS)
-    assert prompt.margins.max_sensitivity == pytest.approx(5.1, abs=0.1)
+def test_the_designs_are_the_optima(designs):
+    for now, then in zip(landing.design_rows(sh.load_case("landing")), designs, strict=True):
+        assert (now["structure"], now["ok"]) == (then["structure"], then["ok"])
+        assert now["status"] == then["status"]
+        assert float(now["payload_rms"]) == pytest.approx(float(then["payload_rms"]), rel=2e-3)
