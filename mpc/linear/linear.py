@@ -20,7 +20,6 @@ from .winch_mpc import WinchMPC, WinchOptions
 
 _SAME = 1e-3  # of the peak torque
 _TORQUE, _SPEED = HEARD.index("motor.torque"), HEARD.index("motor.speed")
-_REFERENCE = HEARD.index("reference.displacement")
 
 
 class LinearMPC(WinchMPC):
@@ -160,7 +159,7 @@ class LinearMPC(WinchMPC):
         )
         ahead, gradient, free = products.known(chi)
         self.estimator.advance(ahead)
-        reference = shown[_REFERENCE : _REFERENCE + 2]
+        reference = self._reference(shown)
         if reference.any():
             gradient, free = products.shifted(gradient, free, reference)
         forecast = self._forecast(shown, time)

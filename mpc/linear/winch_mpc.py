@@ -59,6 +59,7 @@ _PROVED = 1e-6  # residual of the optimality conditions
 _IN_BAND = 3.0  # [rad/s]
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
+_REFERENCE = HEARD.index("reference.displacement")
 
 _EDGE = 1e-7  # of a move that is at its bound
 _MOST = 0.2  # of the peak: half of what the torque may fall by over a sample
@@ -206,6 +207,7 @@ class WinchMPC(ABC):
         self._age = 0
         self._speeds = np.zeros(len(self._blocks))  # at the start of each move, by the last plan
         self._asked = self.model.winch.rest_torque  # of the drive at the sample before [N m]
+        self._set_point = np.zeros(2)  # displacement [m] and velocity [m/s], the last finite one
         self._counts = dict.fromkeys(
             ("steps", "iterations", "late", "shifted", "safe", "unproved"), 0
         )
@@ -244,6 +246,18 @@ class WinchMPC(ABC):
         self.predictor.update(heave, rate, bool(shown[_UNIT] > 0.5), time)
         return self.predictor.forecast()
 
+    def _reference(self, shown: FloatArray) -> FloatArray:
+        """Return the displacement [m] and velocity [m/s] that are asked for, (2,).
+
+        A set point that is not finite keeps its last place, at rest there.
+        """
+        asked = shown[_REFERENCE : _REFERENCE + 2]
+        if math.isfinite(float(asked.sum())):
+            self._set_point = asked
+        else:
+            self._set_point = np.array([self._set_point[0], 0.0])
+        return self._set_point
+
     def _cap(self, shown: FloatArray) -> float:
         """Return the highest torque that the windings' temperature allows [N m]."""
         if self._budget is None:
@@ -256,9 +270,8 @@ class WinchMPC(ABC):
     ) -> float | None:
         """Return the first move of the answer, None if there is none that is good."""
         self.question, self.solved = question, None
-        # A number that is not finite can only come from the estimate, which has to begin again.
+        # The estimate is finite (`WinchEstimator`): it is the forecast that is not.
         if not all(math.isfinite(float(part.sum())) for part in question):
-            self.estimator.reset()
             return None
         solved = self.qp.solve(*question)
         self._counts["iterations"] += solved.iterations

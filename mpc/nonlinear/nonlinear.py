@@ -28,7 +28,6 @@ from .stage import force_law, make_stage
 
 _OWNER = "nonlinear predictive control"
 _APPLIED = HEARD.index("drive.applied")
-_REFERENCE = HEARD.index("reference.displacement")
 
 
 class NonlinearMPC(WinchMPC):
@@ -173,7 +172,7 @@ class NonlinearMPC(WinchMPC):
         chi = self.estimator.update(measurement, applied=self._uncut(float(shown[_APPLIED])))
         ahead, known = shooting.known(chi)
         self.estimator.advance(ahead)
-        reference = shown[_REFERENCE : _REFERENCE + 2]
+        reference = self._reference(shown)
         if reference.any():
             known = shooting.shifted(known, reference)
         forecast = self._forecast(shown, time)

@@ -6,10 +6,15 @@ Every measurement is taken in units of its own error, since a state of radians, 
 and sensors of any precision would leave nothing of a common scale.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
 from models.basics import FloatArray, solve_discrete_riccati
+
+_SETTLED = 1e-5  # of a state's variance, that the steady gain in place of the right one may add
+_LOOKED = 16  # samples from one look at that to the next
 
 
 def prediction_covariance(
@@ -47,6 +52,99 @@ def kalman_gain(
         innovation = scaled @ P @ scaled.T + np.eye(len(scaled))
         gain[:, there] = np.linalg.solve(innovation, scaled @ P).T / error
     return gain
+
+
+class ChangingGains:
+    """Gains of a Kalman filter whose signals come and go.
+
+    The gain that is right for all signals together may let a filter run away that hears some of
+    them only.  Each set of signals has a steady gain; where the set changes, the covariance is
+    carried from sample to sample with what is there, until it is the steady one.
+
+    Parameters
+    ----------
+    A, C, Q, R
+        The process and its outputs: (n, n), (ny, n), the covariance (n, n) of what a sample adds,
+        and the variances (ny,) of the outputs' errors.
+    steady
+        Covariance of the steady one-step prediction of each set of signals that has one, (n, n), by
+        the signals that are there as bytes of (ny,) booleans.
+    scale
+        Size of each state, (n,), for the numerics.
+    """
+
+    def __init__(
+        self,
+        A: FloatArray,
+        C: FloatArray,
+        Q: FloatArray,
+        R: FloatArray,
+        steady: Mapping[bytes, FloatArray],
+        scale: FloatArray,
+    ) -> None:
+        # Each state in its own size, each output in units of its own error.
+        self._A = np.ascontiguousarray(A / scale[:, None] * scale)
+        self._C = np.ascontiguousarray(C * scale / np.sqrt(R)[:, None])
+        self._Q = Q / np.outer(scale, scale)
+        self._back = scale[:, None] / np.sqrt(R)
+        self._outer = np.outer(scale, scale)
+        self._steady = {
+            there: (
+                P / self._outer,
+                kalman_gain(C, R, P, np.frombuffer(there, np.bool_)) / self._back,
+            )
+            for there, P in steady.items()
+        }
+        self.begin(Q)
+
+    def begin(self, P: FloatArray) -> None:
+        """Begin with the covariance of a prediction, (n, n)."""
+        self._P = P / self._outer
+        self._there = b""
+        self._held: FloatArray | None = None
+        self._samples = 0
+
+    def steady(self, there: npt.NDArray[np.bool_]) -> FloatArray | None:
+        """Return the steady gain of a set of signals, (n, ny); None if it has none."""
+        found = self._steady.get(there.tobytes())
+        return None if found is None else np.asarray(found[1] * self._back)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """The covariance of the prediction for the next sample, (n, n)."""
+        return np.asarray(self._P * self._outer)
+
+    def at(self, there: npt.NDArray[np.bool_]) -> FloatArray:
+        """Return the gain of a sample at which some signals are there, (n, ny), and go on."""
+        key = there.tobytes()
+        if key != self._there:
+            self._there, self._held = key, None
+            self._samples = 0
+        if self._held is not None:
+            return self._held
+        gain = np.zeros((len(self._A), len(there)))
+        P = self._P
+        if there.any():
+            rows = self._C[there]
+            seen = P @ rows.T
+            innovation = rows @ seen
+            innovation.flat[:: len(rows) + 1] += 1.0
+            found = np.linalg.solve(innovation, seen.T).T
+            gain[:, there] = found
+            self._samples += 1
+            if self._samples % _LOOKED == 0 and key in self._steady:
+                steady, held = self._steady[key]
+                off = gain - held
+                added = np.einsum("ij,jk,ik->i", off[:, there], innovation, off[:, there])
+                if np.all(added <= _SETTLED * np.diag(P)):
+                    self._P = steady
+                    self._held = np.asarray(held * self._back)
+                    return self._held
+            P = P - found @ seen.T
+        P = self._A @ P @ self._A.T
+        P += self._Q
+        self._P = 0.5 * (P + P.T)
+        return np.asarray(gain * self._back)
 
 
 def corrected(P: FloatArray, C: FloatArray, R: FloatArray, gain: FloatArray) -> FloatArray:

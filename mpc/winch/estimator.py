@@ -4,27 +4,32 @@ r"""Kalman filter of winch, sea and sensors' errors, for any set of signals: `Wi
 
 Steady-state gain of the prediction model's Riccati equation (Anderson and Moore, *Optimal
 Filtering*, 1979, sec. 4.4); before it, for some seconds, the gains of a filter that does not yet
-know the load's weight.  Where signals are missing, the gain is that of the others at the same
-covariance.  What comes late is compared with what was on its way at that age.
+know the load's weight.  Where signals are missing, the gain is that of the others alone, with the
+covariance that they lead to (`mpc.programme.kalman.ChangingGains`): made for all signals together
+it would let the estimate run away.  What comes late is compared with what was on its way at that
+age.
 
 A number that is not finite never gets in: a signal that shows one counts as missing.
 """
 
 import math
+from itertools import product
 
 import numpy as np
 
-from models.basics import BoolArray, FloatArray, read_only
+from models.basics import FloatArray, SolverError, read_only
 from models.plant import MEASUREMENTS
 from models.sensing import HEARD, MEASURED, Measurement
 
-from ..programme import corrected, kalman_gain, prediction_covariance
+from ..programme import ChangingGains, corrected, kalman_gain, prediction_covariance
 from .prediction import PredictionModel, constant_scales
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
 _UNIT = HEARD.index("mru.valid")
 _TELEMETRY, _REFERENCE = slice(0, 3), slice(3, 5)  # among the measurements
+_GROUPS = _TELEMETRY, _REFERENCE, slice(5, 7), slice(7, 8)  # telegram, unit, encoder, load cell
+_FORGOTTEN = 3600.0  # in which the gains let constants be forgotten of which nothing tells [s]
 _APPLIED = HEARD.index("drive.applied")
 _STARTING = 10.0  # in which the gain comes to its steady value [s]
 # What is not known of the constants at first, over `constant_scales`.
@@ -43,9 +48,8 @@ class WinchEstimator:
     def __init__(self, model: PredictionModel) -> None:
         self.model = model
         self.covariance = kalman_covariance(model)
-        # By what is there: of the 2^8 sets of signals a few occur, each for many samples.
-        self._gains: dict[bytes, FloatArray] = {}
-        self.gain = self._gain(np.ones(len(MEASURED), dtype=np.bool_))
+        self.gain = kalman_gain(model.C, model.R, self.covariance)
+        self._gains = changing_gains(model, self.covariance)
         self._first = _first_gains(model, self.covariance)
         self._C = np.ascontiguousarray(model.C)
         self._A = np.ascontiguousarray(model.A)
@@ -81,6 +85,7 @@ class WinchEstimator:
         self._drag = 0.0  # force of quadratic drag at the sample before [N]
         self._begun = False
         self._samples = 0
+        self._gains.begin(self.covariance)
 
     @property
     def sea_covariance(self) -> FloatArray:
@@ -120,12 +125,12 @@ class WinchEstimator:
         if shown[_UNIT] <= 0.5:
             there[_REFERENCE] = False
         if not there.all():
-            gain, error = self._gain(there), np.where(there, error, 0.0)
+            gain, error = self._gains.at(there), np.where(there, error, 0.0)
         elif self._samples < len(self._first):
             gain = self._first[self._samples]
             self._samples += 1
         else:
-            gain = self.gain
+            gain = self._gains.at(there)
         self.state = ahead + gain @ error
         if not float(np.abs(self.state).max()) < _HUGE:  # no number, or no longer of this world
             self.reset()
@@ -146,13 +151,6 @@ class WinchEstimator:
             rows[MEASURED.index(name)] = self.model.late_row(name, age)
         return rows
 
-    def _gain(self, there: BoolArray) -> FloatArray:
-        """Return the gain of the measurements that are there, (ny,)."""
-        key = there.tobytes()
-        if key not in self._gains:
-            self._gains[key] = kalman_gain(self.model.C, self.model.R, self.covariance, there)
-        return self._gains[key]
-
 
 def kalman_covariance(model: PredictionModel) -> FloatArray:
     """Return the covariance of the steady one-step prediction, (n, n).
@@ -164,6 +162,32 @@ def kalman_covariance(model: PredictionModel) -> FloatArray:
     # to, the equation is solved an order of magnitude closer.
     known = np.sqrt(np.diag(P))
     return read_only(prediction_covariance(model.A, model.C, model.G, model.R, known))
+
+
+def changing_gains(model: PredictionModel, covariance: FloatArray) -> ChangingGains:
+    """Return the gains for any set of signals; states are scaled by a covariance (n, n).
+
+    Of a telegram, of the reference unit, the encoder and the load cell each is there as a whole or
+    not; a set that tells neither of the drum nor of the payload has no steady gain.  For the gains
+    the constants are forgotten in an hour: one of which nothing tells would else drift for ever.
+    """
+    A, kept = model.A.copy(), np.sqrt(np.diag(covariance))
+    at = np.arange(model.constants_at.start, model.constants_at.stop)
+    A[at, at] = math.exp(-model.winch.sample_time / _FORGOTTEN)
+    scale = np.where(kept > 0.0, kept, model.scale)
+    steady = {}
+    for aboard in product((True, False), repeat=4):
+        there = np.zeros(len(MEASURED), dtype=np.bool_)
+        for part, own in zip(_GROUPS, aboard, strict=True):
+            there[part] = own
+        if not (aboard[0] or aboard[2]):
+            continue
+        try:
+            P = prediction_covariance(A, model.C[there], model.G, model.R[there], scale)
+        except SolverError:
+            continue
+        steady[there.tobytes()] = P
+    return ChangingGains(A, model.C, model.G @ model.G.T, model.R, steady, scale)
 
 
 def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:

@@ -577,3 +577,30 @@ def test_moves_stay_below_the_breakdown_torque_at_the_planned_speeds() -> None:
     assert most < case.winch.power_limit / (2.0 * base)
     assert high * unit + rest == pytest.approx(most, rel=1e-9)
     assert low * unit + rest == pytest.approx(-most, rel=1e-9)
+
+
+def test_a_set_point_that_is_no_number_keeps_its_place_and_the_estimate():
+    """One NaN once wiped the filter: the load moved by 1.8 m."""
+    controller = controller_of("thesis-1975", 0.5)
+
+    class Told:
+        name, case, sample_time = "told", controller.case, controller.sample_time
+
+        def reset(self):
+            controller.reset()
+
+        def step(self, measurement, time):
+            values = measurement.values.copy()
+            at = HEARD.index("reference.displacement")
+            values[at] = 1.0
+            if 60.0 < time < 60.1 or 70.0 < time < 75.0:
+                values[at : at + 2] = _NAN, 0.3
+            states.append(controller.estimator.state.copy())
+            return controller.step(Measurement(values), time)
+
+    states: list[np.ndarray] = []
+    run = run_of(Told(), 120.0)
+    late = run.time > 50.0
+    assert np.abs(run["payload.displacement"][late] - 1.0).max() < 0.02
+    assert controller.counts["safe"] == controller.counts["shifted"] == 0
+    assert min(np.abs(state).max() for state in states[400:]) > 0.0

@@ -1,0 +1,210 @@
+"""The winch's Kalman filter: the gain fits the signals that are there, and what is late is late."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from mpc_cases import WEIGHTS, case_of
+
+import models
+from models.sensing import HEARD, MEASURED, Measurement
+from mpc.programme import ChangingGains, corrected, kalman_gain
+from mpc.winch import SampledWinch, WinchEstimator, prediction_model, sampled_winch, with_noise
+from mpc.winch.estimator import changing_gains, kalman_covariance
+
+GROUPS = {"payload": slice(0, 3), "mru": slice(3, 5), "encoder": slice(5, 7), "cell": slice(7, 8)}
+AT = {name: k for k, name in enumerate(HEARD)}
+T = 0.05
+
+
+def model_of(name):
+    case = models.load_case("subsea-crane") if name == "subsea-crane" else case_of(name)
+    return with_noise(prediction_model(sampled_winch(case, sample_time=T)), WEIGHTS[name].noise)
+
+
+@pytest.fixture(scope="module")
+def estimator():
+    return WinchEstimator(model_of("thesis-1975"))
+
+
+def signals(*aboard):
+    there = np.zeros(len(MEASURED), dtype=np.bool_)
+    for name in aboard:
+        there[GROUPS[name]] = True
+    return there
+
+
+def shown(model, chi, *, age=None, **changes):
+    """What sensors without errors show of a state, with telemetry of an age [s]."""
+    C = model.C.copy()
+    delays = dict(zip(MEASURED, model.winch.plant.delays, strict=True))
+    age = delays[MEASURED[0]] if age is None else age
+    for k, name in enumerate(MEASURED[:3]):
+        C[k] = model.late_row(name, age)
+    values = np.zeros(len(HEARD))
+    for name, value in zip(MEASURED, C @ chi, strict=True):
+        values[AT[name]] = value
+    values[AT["rope.tension"]] += model.winch.rest_tension
+    values[AT["payload.age"]] = age
+    values[[AT["payload.valid"], AT["mru.valid"]]] = 1.0
+    values[AT["drive.applied"]] = model.winch.rest_command
+    for name, value in changes.items():
+        values[AT[name.replace("__", ".")]] = value
+    return Measurement(values)
+
+
+@pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
+def test_every_set_of_signals_that_tells_of_the_load_or_the_drum_has_a_filter_that_holds(name):
+    model = model_of(name)
+    gains = changing_gains(model, kalman_covariance(model))
+    found = 0
+    for aboard in product((True, False), repeat=4):
+        names = [one for one, on in zip(GROUPS, aboard, strict=True) if on]
+        if not {"payload", "encoder"} & set(names):
+            continue
+        there = signals(*names)
+        gain = gains.steady(there)
+        assert gain is not None, names
+        assert not gain[:, ~there].any()
+        left = np.eye(model.size) - gain @ model.C
+        # Constants of which nothing tells stay what they are; nothing else may grow.
+        assert np.abs(np.linalg.eigvals(model.A @ left)).max() < 1.0 + 1e-9, names
+        found += 1
+    assert found == 12
+
+
+def test_the_gain_of_all_signals_is_no_filter_without_the_payloads():
+    """Why the gain has to change: this is what happened to who lost his telemetry."""
+    model = model_of("subsea-crane")
+    there = signals("mru", "encoder", "cell")
+    stale = kalman_gain(model.C, model.R, kalman_covariance(model), there)
+    growth = np.abs(np.linalg.eigvals(model.A @ (np.eye(model.size) - stale @ model.C))).max()
+    assert growth > 1.001
+
+
+def test_gains_of_changing_signals_are_those_of_the_textbooks_recursion():
+    model = model_of("thesis-1975")
+    P = kalman_covariance(model)
+    gains = changing_gains(model, P)
+    gains.begin(P)
+    rng = np.random.default_rng(16)
+    A = model.A.copy()
+    at = np.arange(model.constants_at.start, model.constants_at.stop)
+    A[at, at] = math.exp(-T / 3600.0)
+    size = np.sqrt(np.diag(P)) + 1e-12
+    for _ in range(60):
+        there = rng.random(len(MEASURED)) < 0.5
+        expected = kalman_gain(model.C, model.R, P, there)
+        found = gains.at(there)
+        scaled = (found - expected) * np.sqrt(model.R) / size[:, None]
+        assert np.abs(scaled).max() < 1e-6
+        P = A @ corrected(P, model.C, model.R, expected) @ A.T + model.G @ model.G.T
+    np.testing.assert_allclose(np.diag(gains.covariance), np.diag(P), rtol=1e-6, atol=1e-18)
+
+
+def test_a_set_that_lasts_comes_to_its_steady_gain_and_is_held_there():
+    model = model_of("thesis-1975")
+    gains = changing_gains(model, kalman_covariance(model))
+    there, every = signals("mru", "encoder", "cell"), np.ones(len(MEASURED), dtype=np.bool_)
+    gains.begin(kalman_covariance(model))
+    first = gains.at(there)
+    for _ in range(12_000):
+        last = gains.at(there)
+    steady = gains.steady(there)
+    assert np.array_equal(last, steady)
+    assert not np.allclose(first, steady, rtol=0.05)
+    for _ in range(4000):
+        back = gains.at(every)
+    assert np.array_equal(back, gains.steady(every))
+
+
+def test_signals_that_nobody_planned_for_have_a_gain_too():
+    A, C = np.array([[1.0, 0.1], [0.0, 1.0]]), np.eye(2)
+    Q, R = 0.01 * np.eye(2), np.ones(2)
+    gains = ChangingGains(A, C, Q, R, {}, np.ones(2))
+    none, one = np.zeros(2, dtype=np.bool_), np.array([True, False])
+    assert gains.steady(one) is None
+    assert not gains.at(none).any()
+    before = np.trace(gains.covariance)
+    for _ in range(500):
+        gain = gains.at(one)
+    assert np.abs(np.linalg.eigvals(A @ (np.eye(2) - gain @ C))).max() < 1.0
+    assert gains.covariance[0, 0] < 10.0 * before
+
+
+@pytest.mark.parametrize("lost", ["mru__valid", "payload__valid"])
+def test_what_is_shown_as_lost_is_not_looked_at(estimator, lost):
+    model = estimator.model
+    chi = np.zeros(model.size)
+    part = ("mru.heave", "mru.heave_rate") if lost == "mru__valid" else MEASURED[:3]
+    found = []
+    for wrong in (0.0, 5.0):
+        estimator.reset()
+        lies = {name.replace(".", "__"): wrong for name in part}
+        for _ in range(40):
+            estimator.advance(model.A @ estimator.update(shown(model, chi, **lies, **{lost: 0.0})))
+        found.append(estimator.state.copy())
+    assert np.array_equal(*found)
+    estimator.reset()
+    for _ in range(3):
+        state = estimator.update(
+            shown(model, chi, **{name.replace(".", "__"): 5.0 for name in part})
+        )
+        estimator.advance(model.A @ state)
+    assert np.abs(estimator.state).max() > 1.0  # valid, it counts
+
+
+@pytest.mark.parametrize("later", [0.0, 0.03, 0.05])
+def test_a_message_that_is_late_is_compared_with_what_was_on_its_way_then(
+    estimator, later, monkeypatch
+):
+    """A world without errors is followed without one, whatever the age of its messages."""
+    monkeypatch.setattr(SampledWinch, "extra_drag", lambda self, velocity: 0.0)
+    model = estimator.model
+    estimator.reset()
+    rng = np.random.default_rng(3)
+    chi = np.zeros(model.size)
+    chi[model.sea_at] = rng.normal(size=model.sea.order)
+    estimator.update(shown(model, chi))
+    estimator.state, estimator.speed = chi.copy(), 0.0
+    estimator.advance(model.A @ chi)
+    usual, winch = model.winch.plant.delays[0], model.winch
+    for _ in range(100):
+        none = winch.command(0.0, float(winch.speed @ chi[: winch.size]))
+        chi = model.A @ chi
+        seen = estimator.update(shown(model, chi, age=usual + later, drive__applied=none))
+        estimator.advance(model.A @ seen)
+        assert np.abs((seen - chi) / model.scale).max() < 1e-7
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.02, 0.08])
+def test_drag_that_a_perfect_accelerometer_feels_comes_with_its_message(delay):
+    """It is felt at once, and what is on its way holds that of the samples before."""
+    case = case_of("thesis-1975-rope", delay=delay)
+    noise = WEIGHTS["thesis-1975-rope"].noise
+    model = with_noise(prediction_model(sampled_winch(case, sample_time=T)), noise)
+    estimator, winch = WinchEstimator(model), model.winch
+    felt = winch.force_felt[0]
+    assert felt > 0.0
+    chi = np.zeros(model.size)
+    chi[winch.plant.states.index("payload.velocity")] = 0.8  # it swings in still water
+    estimator.update(shown(model, chi))
+    estimator.state, estimator.speed = chi.copy(), 0.0
+    estimator._drag = drag = winch.extra_drag(0.8)
+    estimator.advance(model.A @ chi)
+    for _ in range(60):
+        none = winch.command(0.0, float(winch.speed @ chi[: winch.size]))
+        ahead = model.A @ chi
+        after = winch.extra_drag(float(winch.velocity @ ahead[: winch.size]))
+        ahead[: winch.size] += 0.5 * (drag + after) * winch.from_constants[:, 0]
+        ahead[model.first[MEASURED[0]]] += felt * drag
+        chi, drag = ahead, winch.extra_drag(float(winch.velocity @ ahead[: winch.size]))
+        now = shown(model, chi, drive__applied=none).values
+        # A message taken between two samples is so far between what was felt at both.
+        now[AT["payload.acceleration"]] += felt * drag * max(0.0, 1.0 - delay / T)
+        seen = estimator.update(Measurement(now))
+        estimator.advance(model.A @ seen)
+        assert np.abs((seen - chi) / model.scale).max() < 1e-5
