@@ -47,6 +47,9 @@ def test_questions_are_bundled_cases_then_random_ones():
     asked = holds.questions()
     assert [q.number for q in asked] == list(range(248))
     assert sum(q.name == "random" for q in asked) == 200
+    assert {q.structure for q in asked} == {None, *holds.NESTED}
+    tenth = [q.structure for q in asked if q.structure and q.number % holds.TENTH == 0]
+    assert all(tenth.count(name) == 4 for name in holds.NESTED)
     case = question(10).case  # the crane at 2000 m in its own sea: more rope on the drum
     assert case.rope.length == 2000.0
     assert case.sea.significant_height == 2.0
@@ -114,6 +117,9 @@ def test_a_book_goes_on_where_it_stopped(tmp_path):
     book.keep(third, [{"question": 2, "case": "crane", "ok": "no"}])
     again = holds.Book(path, "new")
     assert [q.number for q in again.left([first, second, third])] == [0, 1]
+    order = [q.number for q in holds.Book(tmp_path / "none.csv", "new").left(holds.questions())]
+    assert sorted(order) == list(range(248))
+    assert sum(number < holds.FIRST_RANDOM for number in order[:62]) == 12
     assert [row["question"] for row in read_rows(path)] == ["1", "2"]
 
 
