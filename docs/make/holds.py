@@ -167,6 +167,7 @@ class Question:
         field = "sea.significant_period" if "thesis" in self.name else "sea.peak_period"
         own = getattr(case.sea, field.removeprefix("sea."))
         changes: dict[str, Any] = {
+            "limits.drive": "enforce",
             "rope.length": depth,
             "sea.significant_height": height * case.sea.significant_height,
             field: period * own,
