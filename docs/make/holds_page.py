@@ -113,6 +113,20 @@ def pooled_saturation(rows: Iterable[Row]) -> float:
     return sum(share * runs for share, runs in told) / total if total else math.nan
 
 
+def far_by_chance(rows: Iterable[Row]) -> float:
+    """Return how many dynamic parts of Gaussian signals lie beyond `FARTHEST` times the printed.
+
+    Of N cycles the largest exceeds f sqrt(2 ln N) sigma with the probability 1 - exp(-N^(1 - f^2));
+    N is that of the sea's peak period.
+    """
+    total = 0.0
+    for row in simulated(rows):
+        cycles = holds.EXPOSURE / float(row["T_p"])
+        trials = sum(len(one.ratios) for one in extremes(row) if one.signal != "power")
+        total += trials * -math.expm1(-(cycles ** (1.0 - FARTHEST**2)))
+    return total
+
+
 def kinds(rows: Iterable[Row]) -> list[Kind]:
     """Return what all runs say of each kind of extreme; power is a bound and no kind.
 
@@ -154,6 +168,7 @@ def summary(rows: Sequence[Row]) -> str:
     runs = sum(int(row["runs"]) + int(row["again"]) for row in done)
     off = sum(any(abs(o) > may for o, may in deviations(row).values()) for row in done)
     far = sum(any(max(one.ratios) > FARTHEST for one in extremes(row)) for row in done)
+    chance = f"about {far_by_chance(done):.0f} by chance alone"
     body = [
         (
             "saturated, of the pooled time",
@@ -166,7 +181,11 @@ def summary(rows: Sequence[Row]) -> str:
             "0",
             str(off),
         ),
-        (f"designs with a dynamic part above {FARTHEST} times the printed", "0", str(far)),
+        (
+            f"designs with a dynamic part above {FARTHEST} times the printed",
+            "0",
+            f"{far}; {chance}",
+        ),
         ("designs that go slack", "0", str(sum(float(row["slack"]) > 0.0 for row in done))),
         (
             "designs that grow at the rope's least damping, under either law",
@@ -177,8 +196,8 @@ def summary(rows: Sequence[Row]) -> str:
     ]
     questions = len({row["question"] for row in rows})
     text = (
-        f"{len(rows)} designs for {questions} cases, {len(done)} of them ok and simulated, "
-        f"{runs} runs of 3 h; {len(broken)} break something."
+        f"{len(rows)} designs for {questions} of {holds.COUNT} cases, {len(done)} of them ok and "
+        f"simulated, {runs} runs of 3 h; {len(broken)} break something."
     )
     return f"{text}\n\n{_table(('', 'asked', 'found'), body)}"
 
