@@ -604,3 +604,53 @@ def test_a_set_point_that_is_no_number_keeps_its_place_and_the_estimate():
     assert np.abs(run["payload.displacement"][late] - 1.0).max() < 0.02
     assert controller.counts["safe"] == controller.counts["shifted"] == 0
     assert min(np.abs(state).max() for state in states[400:]) > 0.0
+
+
+def test_a_drive_that_holds_its_peak_is_no_surprise_to_the_filter(monkeypatch):
+    """It gives more over a sample than the command that it is cut from, and the filter is told."""
+    controller = controller_of("thesis-1975", 2.43)
+    estimator, winch = controller.estimator, controller.model.winch
+    at = HEARD.index("motor.speed")
+    surprises: list[float] = []
+    update = type(estimator).update
+
+    def watched(self, measurement, applied=_NAN):
+        state = update(self, measurement, applied=applied)
+        if told:  # the drive has held its peak over the last sample
+            surprises.append(float(measurement.values[at] - winch.speed @ before[0]))
+        return state
+
+    held = LinearMPC._held
+
+    def noted(self, torque, speed):
+        found = held(self, torque, speed)
+        told[:] = [found] if math.isfinite(found) else []
+        used = found if honest else _NAN
+        # What the filter expects of the speed, once it knows what the drive has done.
+        applied = used if math.isfinite(used) else shown_applied(self)
+        ahead = estimator._ahead + estimator._B * winch.torque(applied, estimator.speed)
+        before[0] = ahead[: winch.size]
+        return used
+
+    def shown_applied(self):
+        return float(last[0].values[HEARD.index("drive.applied")])
+
+    step = LinearMPC.step
+
+    def stepped(self, measurement, time):
+        last[0] = measurement
+        return step(self, measurement, time)
+
+    told: list[float] = []
+    before: list[np.ndarray] = [np.zeros(winch.size)]
+    last: list[Measurement] = [Measurement(np.zeros(len(HEARD)))]
+    monkeypatch.setattr(type(estimator), "update", watched)
+    monkeypatch.setattr(LinearMPC, "_held", noted)
+    monkeypatch.setattr(LinearMPC, "step", stepped)
+    rms = {}
+    for honest in (True, False):
+        surprises.clear()
+        run_of(controller, 60.0, settle=20.0)
+        assert len(surprises) > 20
+        rms[honest] = float(np.std(surprises))
+    assert rms[True] < 0.5 * rms[False]

@@ -208,3 +208,22 @@ def test_drag_that_a_perfect_accelerometer_feels_comes_with_its_message(delay):
         seen = estimator.update(Measurement(now))
         estimator.advance(model.A @ seen)
         assert np.abs((seen - chi) / model.scale).max() < 1e-5
+
+
+def test_a_load_of_another_weight_is_known_within_seconds_of_the_start(monkeypatch):
+    """The steady gain, for a constant that hardly drifts, would take minutes."""
+    monkeypatch.setattr(SampledWinch, "extra_drag", lambda self, velocity: 0.0)
+    model = model_of("thesis-1975")
+    estimator, winch = WinchEstimator(model), model.winch
+    more = 0.05 * winch.rest_tension
+    chi = np.zeros(model.size)
+    at = model.constants_at.start + 3
+    chi[at] = more  # seen from where it hangs at rest, it is the tension that is off
+    found = []
+    for _ in range(round(60.0 / T)):
+        none = winch.command(0.0, estimator.speed)
+        state = estimator.update(shown(model, chi, drive__applied=none))
+        estimator.advance(model.A @ state)
+        found.append(state[at] / more)
+    assert found[round(5.0 / T)] == pytest.approx(1.0, abs=0.05)
+    assert found[-1] == pytest.approx(1.0, abs=0.02)
