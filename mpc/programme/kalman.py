@@ -71,6 +71,8 @@ class ChangingGains:
         the signals that are there as bytes of (ny,) booleans.
     scale
         Size of each state, (n,), for the numerics.
+    added
+        Q of sets of signals with which a sample is taken to add something else, as `steady`.
     """
 
     def __init__(
@@ -81,6 +83,7 @@ class ChangingGains:
         R: FloatArray,
         steady: Mapping[bytes, FloatArray],
         scale: FloatArray,
+        added: Mapping[bytes, FloatArray] | None = None,
     ) -> None:
         # Each state in its own size, each output in units of its own error.
         self._A = np.ascontiguousarray(A / scale[:, None] * scale)
@@ -88,6 +91,7 @@ class ChangingGains:
         self._Q = Q / np.outer(scale, scale)
         self._back = scale[:, None] / np.sqrt(R)
         self._outer = np.outer(scale, scale)
+        self._added = {there: own / self._outer for there, own in (added or {}).items()}
         self._steady = {
             there: (
                 P / self._outer,
@@ -142,7 +146,7 @@ class ChangingGains:
                     return self._held
             P = P - found @ seen.T
         P = self._A @ P @ self._A.T
-        P += self._Q
+        P += self._added.get(key, self._Q)
         self._P = 0.5 * (P + P.T)
         return np.asarray(gain * self._back)
 

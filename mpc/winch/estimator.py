@@ -170,24 +170,31 @@ def changing_gains(model: PredictionModel, covariance: FloatArray) -> ChangingGa
     Of a telegram, of the reference unit, the encoder and the load cell each is there as a whole or
     not; a set that tells neither of the drum nor of the payload has no steady gain.  For the gains
     the constants are forgotten in an hour: one of which nothing tells would else drift for ever.
+    Noise on load and rope buys robustness where the load is heard of; where neither telegram nor
+    load cell tells of it, it would let the drum's speed tell of a load that swings, and is left
+    out.
     """
     A, kept = model.A.copy(), np.sqrt(np.diag(covariance))
     at = np.arange(model.constants_at.start, model.constants_at.stop)
     A[at, at] = math.exp(-model.winch.sample_time / _FORGOTTEN)
     scale = np.where(kept > 0.0, kept, model.scale)
-    steady = {}
+    steady, added = {}, {}
+    unshaken = model.G.copy()
+    unshaken[:, model.load_noise] = 0.0
     for aboard in product((True, False), repeat=4):
         there = np.zeros(len(MEASURED), dtype=np.bool_)
         for part, own in zip(_GROUPS, aboard, strict=True):
             there[part] = own
         if not (aboard[0] or aboard[2]):
             continue
+        G = model.G if aboard[0] or aboard[3] else unshaken
+        added[there.tobytes()] = G @ G.T
         try:
-            P = prediction_covariance(A, model.C[there], model.G, model.R[there], scale)
+            P = prediction_covariance(A, model.C[there], G, model.R[there], scale)
         except SolverError:
             continue
         steady[there.tobytes()] = P
-    return ChangingGains(A, model.C, model.G @ model.G.T, model.R, steady, scale)
+    return ChangingGains(A, model.C, model.G @ model.G.T, model.R, steady, scale, added)
 
 
 def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:

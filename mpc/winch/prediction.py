@@ -137,6 +137,12 @@ class PredictionModel(ReadOnlyArrays):
         first = self.winch.size + self.sea.order + self.errors
         return slice(first, first + len(CONSTANTS))
 
+    @property
+    def load_noise(self) -> list[int]:
+        """Columns of G that shake payload and rope (`ProcessNoise.force`, `ProcessNoise.rope`)."""
+        rope = range(self.known + 2 + len(CONSTANTS), self.G.shape[1] - self.slow.shape[1])
+        return [self.known, *rope]
+
     @cached_property
     def scale(self) -> FloatArray:
         """Size of each state, for the numerics: its standard deviation in the model, or one."""
