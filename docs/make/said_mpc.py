@@ -25,7 +25,7 @@ from stored import DOCS, read_rows
 import stillhook as sh
 from models import PhysicsWarning
 from models.basics import FloatArray
-from models.sensing import Measurement
+from models.sensing import HEARD, Measurement
 from mpc.forecast import AdaptiveAR
 from mpc.linear import path_of_sea
 from mpc.nonlinear import NonlinearMPC
@@ -65,6 +65,59 @@ def left(case: sh.Case, controller: object, effort: Effort, first: float = SETTL
 def mpc(case: sh.Case, **options: object) -> sh.LinearMPC:
     """Return the controller made for a case."""
     return sh.LinearMPC(case, **{"weights": weights(), **options})
+
+
+class Deaf:
+    """A controller that hears nothing from some sensors for a minute out of two."""
+
+    def __init__(self, own: sh.LinearMPC, *lost: str) -> None:
+        self.name, self.sample_time, self._own, self._lost = "deaf", own.sample_time, own, lost
+
+    def reset(self) -> None:
+        """Forget."""
+        self._own.reset()
+
+    def step(self, measurement: Measurement, time: float) -> float:
+        """Do as always with what is left."""
+        if gone(time):
+            shown = measurement.values.copy()
+            for name in self._lost:
+                shown[HEARD.index(name)] = 0.0 if name.endswith(".valid") else math.nan
+            measurement = Measurement(shown)
+        return self._own.step(measurement, time)
+
+
+def gone(time: float | FloatArray) -> bool | FloatArray:
+    """Return whether sensors are gone: the second minute, the fourth and so on."""
+    return (time // 60.0) % 2 == 1
+
+
+def outages(effort: Effort) -> dict[str, float]:
+    """Return what is left of the payload's rms while sensors of the crane are gone [mm]."""
+    case = sh.load_case("subsea-crane")
+    own = sh.LinearMPC(case)
+    telegram, cell, unit = "payload.valid", "rope.tension", "mru.valid"
+
+    def lost(controller: object, at: bool = True) -> float:
+        runs = sh.simulate(
+            case, controller, seeds=effort.seeds, duration=max(360.0, effort.seconds)
+        )
+        squares = []
+        for run in runs:
+            during = gone(run.time) == at
+            squares.append(
+                float((run["payload.displacement"][during & (run.time > 60)] ** 2).mean())
+            )
+        return 1e3 * math.sqrt(sum(squares) / len(squares))
+
+    return {
+        "none": lost(Deaf(own), at=False),
+        "telegram": lost(Deaf(own, telegram)),
+        "unit": lost(Deaf(own, unit)),
+        "cell": lost(Deaf(own, cell)),
+        "both": lost(Deaf(own, telegram, cell)),
+        "forward": lost(sh.VelocityFeedForward(case, share=1.0)),
+    }
 
 
 def steps(effort: Effort) -> dict[str, float]:
@@ -348,6 +401,17 @@ SAYINGS = [
         name="moves",
         template="({nonlinear} and {linear} mm at 2.43 m)",
         work=moves,
+    ),
+    Saying(
+        page=PAGE,
+        name="outages",
+        template="""
+            On `subsea-crane` a minute without telemetry leaves {telegram:2} mm, one without
+            reference unit {unit:2}, without load cell {cell:2}, without telemetry and load cell
+            {both:2}, where {none:2} mm are left with all of them and feed-forward leaves
+            {forward:2}.
+        """,
+        work=outages,
     ),
     Saying(
         page=PAGE,
