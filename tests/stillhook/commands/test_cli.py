@@ -83,7 +83,7 @@ def test_optimise_prints_a_summary_that_fits_a_terminal(optimised):
         "sensitivity peak M_s",
         "█",
         "price",
-        "starts agree",
+        "15 starts",
         "verified on",
     ):
         assert text in summary
