@@ -28,7 +28,8 @@ Progress = Callable[[str, int, int], None]
 AGREE = 1e-4  # answers whose costs differ by less, relatively, are one answer
 _LEAST = 8  # starts that are drawn at least, however many agree before
 _ENOUGH, _MOST = 4, 0.6  # starts, and share of all, that come by one place: no more are needed
-_SCATTER, _MOST_SCATTER, _HOPS = 2, 12, 3  # starts about the best, by parameter; most; how often
+_SCATTER, _MOST_SCATTER = 2, 12  # starts about the best, by parameter, and most
+_HOPS = (1.5, 1.5, 1.5, 2.5)  # how far they begin from it, in decades, as long as that helps
 _AS_GOOD = 5e-3  # of the log cost, by which rough answers may differ that are as good
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
@@ -236,21 +237,21 @@ def _hopped(
 ) -> None:
     """Add the places that starts far about the best one lead to, and about any that is better."""
     count = min(_SCATTER * min(starts, len(family.parameters)), _MOST_SCATTER)
-    about = np.inf  # log cost of the place that was looked about last
-    for _ in range(_HOPS):
+    about = dict.fromkeys(_HOPS, np.inf)  # log cost of the place that was looked about last
+    for far in _HOPS:
         arrived = [place for place in places if place.arrived]
         if not arrived:
             return
         best = min(arrived, key=lambda p: p.coarse.objective)
-        if best.coarse.objective > about - _AS_GOOD:
-            return
-        about = best.coarse.objective
-        begins = scattered(family, best.coarse.values, count, seed)
+        if best.coarse.objective > about[far] - _AS_GOOD:
+            continue
+        about[far] = now = best.coarse.objective
+        begins = scattered(family, best.coarse.values, far, count, seed)
         back = 0
         for k, begin in enumerate(begins):
             tell("hops", k, len(begins))
             end = _come_by(family, places, begin, best.coarse.coefficients, reference).coarse
-            back += end.converged and abs(end.objective - about) < _AS_GOOD
+            back += end.converged and abs(end.objective - now) < _AS_GOOD
             if back == _ENOUGH:
                 break
         tell("hops", len(begins), len(begins))

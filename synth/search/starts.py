@@ -33,7 +33,7 @@ from .nodes import around, cost_nodes, margin_nodes
 _CANDIDATES = 512
 _TRIED = 64  # candidates that say which member of a family is the hardest
 _ENOUGH = 8  # stable ones: no more are made of unstable ones
-_SCATTERED, _FAR = 7, 2.5  # candidates about an answer (a power of two), and how far in decades
+_SCATTERED = 7  # candidates about an answer (a power of two)
 _FROM_ZERO = 0.1  # of its scale: about which a parameter is scattered that is smaller
 _SPREAD = 0.5  # least distance of two starts, in decades over all parameters
 _LEASH = 1e-3  # price of moving a parameter by a factor of e, squared
@@ -96,17 +96,18 @@ def hardest(family: FamilyProblem, seed: int) -> int:
     return int(np.argmax(burdens))
 
 
-def scattered(family: FamilyProblem, values: FloatArray, count: int, seed: int) -> list[FloatArray]:
+def scattered(
+    family: FamilyProblem, values: FloatArray, far: float, count: int, seed: int
+) -> list[FloatArray]:
     """Return starting points far about an answer: screened candidates with its signs.
 
-    Up to a factor of three hundred either way in every parameter at once, for the answers that lie
-    where a parameter has gone to its end or is of another order: few descents from elsewhere lead
-    there.
+    Up to `far` decades either way in every parameter at once, for the answers that lie where a
+    parameter has gone to its end or is of another order: few descents from elsewhere lead there.
     """
     drawn = qmc.Sobol(values.size, seed=seed).random_base2(_SCATTERED)
     middle = np.copysign(np.maximum(np.abs(values), _FROM_ZERO * family.scales), values)
     low, high = np.array([(p.low, p.high) for p in family.parameters]).T
-    points = np.clip(middle * 10.0 ** (_FAR * (2.0 * drawn - 1.0)), low, high)
+    points = np.clip(middle * 10.0 ** (far * (2.0 * drawn - 1.0)), low, high)
     stable = np.array([point for point in points if family.stable(point)])
     return _picked(family, stable, [np.arange(len(stable))], count)
 

@@ -83,7 +83,7 @@ def test_optimise_prints_a_summary_that_fits_a_terminal(optimised):
         "sensitivity peak M_s",
         "█",
         "price",
-        "15 starts",
+        "starts agree",
         "verified on",
     ):
         assert text in summary
