@@ -14,9 +14,9 @@ PY := $(VENV)/bin/python
 PIP_INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 # Each writes its rows, then its pages and figures; those that only draw come after.
-STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline landing saturation random_starts robust \
-    structures comparison structures_page said_structures said_mpc operability_figures hook_motion \
-    sea_figures)) \
+STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline headline_page landing saturation \
+    random_starts robust structures comparison structures_page said_structures said_mpc \
+    operability_figures hook_motion sea_figures)) \
     benchmarks/sweep.py
 
 .DEFAULT_GOAL := help
