@@ -36,7 +36,7 @@ from ..question import (
     pose_family,
     with_masses,
 )
-from ..search import KEPT, Found, Progress, Solution, glanced, hardest, polish, search, with_bests
+from ..search import KEPT, Found, Progress, glanced, hardest, polish, search, with_bests
 from ..structures import LowOrderFeedback, structures_aboard
 from .design import SWITCHING_LOSS, Design
 from .high_order import high_order_gains
@@ -225,7 +225,13 @@ def _on_the_rope(
         if posed.masses < MAX_MASSES:
             solved = tuning.found.solved
             assert solved is not None
-            stands, masses = seen_at(given, solved)
+            parameters = posed.first.named([float(v) for v in solved.values])
+            stands, masses = seen_at(
+                [
+                    partial(_looked_at, one, parameters, assess=partial(_glance, start))
+                    for one, start in zip(given.questions, solved.coefficients, strict=True)
+                ]
+            )
             least = max(least, masses)
             told = posed if stands and least <= posed.masses else given.on(least)
             if told.masses == posed.masses:
@@ -238,25 +244,15 @@ def _on_the_rope(
     return posed, tuning
 
 
-def seen_at(posed: PosedFamily, solved: Solution) -> tuple[bool, int]:
+def seen_at(
+    looks: Sequence[Callable[[int], tuple[DesignQuestion, Assessment | None, float]]],
+) -> tuple[bool, int]:
     """Return whether an answer keeps the limits where `evaluate_gains` looks at it, on what masses.
 
-    They are those that the answer asks for, whatever masses it was found on.
+    They are those that the answer asks for, whatever masses it was found on; a look for each member
+    is as `on_common_masses` takes it.
     """
-    parameters = posed.first.named([float(v) for v in solved.values])
-
-    def look(
-        question: DesignQuestion, start: Coefficients, masses: int
-    ) -> tuple[DesignQuestion, Assessment | None, float]:
-        return _looked_at(
-            question,
-            parameters,
-            masses,
-            lambda asked, values: glanced(asked.problem, values, start=start),
-        )
-
-    pairs = zip(posed.questions, solved.coefficients, strict=True)
-    seen = on_common_masses([partial(look, *pair) for pair in pairs])
+    seen = on_common_masses(looks)
     stands = all(
         loop is not None
         and all(limit.use(limit.worst(loop)) <= 1.0 + KEPT for limit in question.limits)
@@ -323,6 +319,10 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
 
 def _assessed(question: DesignQuestion, values: Values) -> Assessment:
     return question.problem.assess(values)
+
+
+def _glance(start: Coefficients, question: DesignQuestion, values: Values) -> Assessment | None:
+    return glanced(question.problem, values, start=start)
 
 
 def _looked_at(

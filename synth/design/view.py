@@ -178,7 +178,8 @@ class View:
             if posed.masses == MAX_MASSES:
                 fitted = posed.fitted(ended)
             else:
-                stands, masses = seen_at(self.posed, solved)
+                there = posed.first.named([float(v) for v in solved.values])
+                stands, masses = seen_at([partial(one.loop, there) for one in self._members])
                 least = max(least, masses)
                 fitted = self.posed.on(least)
                 if (stands and least <= posed.masses) or fitted.masses == posed.masses:
