@@ -253,7 +253,7 @@ class WinchMPC(ABC):
         """
         asked = shown[_REFERENCE : _REFERENCE + 2]
         if math.isfinite(float(asked.sum())):
-            self._set_point = asked
+            self._set_point = asked.copy()  # whose array the next sample may be written into
         else:
             self._set_point = np.array([self._set_point[0], 0.0])
         return self._set_point

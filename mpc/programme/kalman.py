@@ -67,12 +67,11 @@ class ChangingGains:
         The process and its outputs: (n, n), (ny, n), the covariance (n, n) of what a sample adds,
         and the variances (ny,) of the outputs' errors.
     steady
-        Covariance of the steady one-step prediction of each set of signals that has one, (n, n), by
-        the signals that are there as bytes of (ny,) booleans.
+        Of each set of signals that has one, by the signals that are there as bytes of (ny,)
+        booleans: what a sample adds with them, (n, n), and the covariance of the steady one-step
+        prediction, (n, n), None if it has none.
     scale
         Size of each state, (n,), for the numerics.
-    added
-        Q of sets of signals with which a sample is taken to add something else, as `steady`.
     """
 
     def __init__(
@@ -81,9 +80,8 @@ class ChangingGains:
         C: FloatArray,
         Q: FloatArray,
         R: FloatArray,
-        steady: Mapping[bytes, FloatArray],
+        steady: Mapping[bytes, tuple[FloatArray, FloatArray | None]],
         scale: FloatArray,
-        added: Mapping[bytes, FloatArray] | None = None,
     ) -> None:
         # Each state in its own size, each output in units of its own error.
         self._A = np.ascontiguousarray(A / scale[:, None] * scale)
@@ -91,14 +89,14 @@ class ChangingGains:
         self._Q = Q / np.outer(scale, scale)
         self._back = scale[:, None] / np.sqrt(R)
         self._outer = np.outer(scale, scale)
-        self._added = {there: own / self._outer for there, own in (added or {}).items()}
-        self._steady = {
-            there: (
-                P / self._outer,
-                kalman_gain(C, R, P, np.frombuffer(there, np.bool_)) / self._back,
-            )
-            for there, P in steady.items()
-        }
+        self._one = np.ones(len(R))
+        self._added, self._steady = {}, {}
+        for there, (added, P) in steady.items():
+            self._added[there] = added / self._outer
+            if P is not None:
+                P = P / self._outer
+                gain = kalman_gain(self._C, self._one, P, np.frombuffer(there, np.bool_))
+                self._steady[there] = P, gain
         self.begin(Q)
 
     def begin(self, P: FloatArray) -> None:
@@ -126,26 +124,19 @@ class ChangingGains:
             self._samples = 0
         if self._held is not None:
             return self._held
-        gain = np.zeros((len(self._A), len(there)))
-        P = self._P
-        if there.any():
-            rows = self._C[there]
-            seen = P @ rows.T
-            innovation = rows @ seen
-            innovation.flat[:: len(rows) + 1] += 1.0
-            found = np.linalg.solve(innovation, seen.T).T
-            gain[:, there] = found
-            self._samples += 1
-            if self._samples % _LOOKED == 0 and key in self._steady:
-                steady, held = self._steady[key]
-                off = gain - held
-                added = np.einsum("ij,jk,ik->i", off[:, there], innovation, off[:, there])
-                if np.all(added <= _SETTLED * np.diag(P)):
-                    self._P = steady
-                    self._held = np.asarray(held * self._back)
-                    return self._held
-            P = P - found @ seen.T
-        P = self._A @ P @ self._A.T
+        P, C = self._P, self._C
+        gain = kalman_gain(C, self._one, P, there)
+        self._samples += 1
+        if self._samples % _LOOKED == 0 and key in self._steady:
+            steady, held = self._steady[key]
+            off = gain - held
+            seen = off @ C
+            added = np.sum((seen @ P) * seen, axis=1) + np.sum(off * off, axis=1)
+            if np.all(added <= _SETTLED * np.diag(P)):
+                self._P = steady
+                self._held = np.asarray(held * self._back)
+                return self._held
+        P = self._A @ (P - gain @ (C @ P)) @ self._A.T
         P += self._added.get(key, self._Q)
         self._P = 0.5 * (P + P.T)
         return np.asarray(gain * self._back)

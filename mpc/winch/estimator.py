@@ -13,6 +13,7 @@ A number that is not finite never gets in: a signal that shows one counts as mis
 """
 
 import math
+from contextlib import suppress
 from itertools import product
 
 import numpy as np
@@ -178,7 +179,7 @@ def changing_gains(model: PredictionModel, covariance: FloatArray) -> ChangingGa
     at = np.arange(model.constants_at.start, model.constants_at.stop)
     A[at, at] = math.exp(-model.winch.sample_time / _FORGOTTEN)
     scale = np.where(kept > 0.0, kept, model.scale)
-    steady, added = {}, {}
+    steady: dict[bytes, tuple[FloatArray, FloatArray | None]] = {}
     unshaken = model.G.copy()
     unshaken[:, model.load_noise] = 0.0
     for aboard in product((True, False), repeat=4):
@@ -188,13 +189,11 @@ def changing_gains(model: PredictionModel, covariance: FloatArray) -> ChangingGa
         if not (aboard[0] or aboard[2]):
             continue
         G = model.G if aboard[0] or aboard[3] else unshaken
-        added[there.tobytes()] = G @ G.T
-        try:
+        P = None
+        with suppress(SolverError):
             P = prediction_covariance(A, model.C[there], G, model.R[there], scale)
-        except SolverError:
-            continue
-        steady[there.tobytes()] = P
-    return ChangingGains(A, model.C, model.G @ model.G.T, model.R, steady, scale, added)
+        steady[there.tobytes()] = G @ G.T, P
+    return ChangingGains(A, model.C, model.G @ model.G.T, model.R, steady, scale)
 
 
 def _first_gains(model: PredictionModel, P: FloatArray) -> list[FloatArray]:

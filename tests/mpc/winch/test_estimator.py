@@ -92,7 +92,7 @@ def test_gains_of_changing_signals_are_those_of_the_textbooks_recursion():
     A, Q, mute = model.A, model.G @ model.G.T, signals("mru", "encoder")
     less = 0.25 * Q
     size = np.sqrt(np.diag(P)) + 1e-12
-    gains = ChangingGains(A, model.C, Q, model.R, {}, size, {mute.tobytes(): less})
+    gains = ChangingGains(A, model.C, Q, model.R, {mute.tobytes(): (less, None)}, size)
     gains.begin(P)
     rng = np.random.default_rng(16)
     for k in range(60):
