@@ -89,7 +89,7 @@ class ChangingGains:
         self._Q = Q / np.outer(scale, scale)
         self._back = scale[:, None] / np.sqrt(R)
         self._outer = np.outer(scale, scale)
-        self._one = np.ones(len(R))
+        self._R, self._one = R, np.ones(len(R))
         self._added, self._steady = {}, {}
         for there, (added, P) in steady.items():
             self._added[there] = added / self._outer
@@ -104,6 +104,7 @@ class ChangingGains:
         self._P = P / self._outer
         self._there = b""
         self._held: FloatArray | None = None
+        self._spread: FloatArray | None = None
         self._samples = 0
 
     def steady(self, there: npt.NDArray[np.bool_]) -> FloatArray | None:
@@ -116,6 +117,13 @@ class ChangingGains:
         """The covariance of the prediction for the next sample, (n, n)."""
         return np.asarray(self._P * self._outer)
 
+    @property
+    def innovations(self) -> FloatArray:
+        """Variances of what the outputs of the next sample are off their predictions by, (ny,)."""
+        if self._spread is None:
+            self._spread = self._R * (1.0 + np.sum((self._C @ self._P) * self._C, axis=1))
+        return self._spread
+
     def at(self, there: npt.NDArray[np.bool_]) -> FloatArray:
         """Return the gain of a sample at which some signals are there, (n, ny), and go on."""
         key = there.tobytes()
@@ -124,7 +132,7 @@ class ChangingGains:
             self._samples = 0
         if self._held is not None:
             return self._held
-        P, C = self._P, self._C
+        P, C, self._spread = self._P, self._C, None
         gain = kalman_gain(C, self._one, P, there)
         self._samples += 1
         if self._samples % _LOOKED == 0 and key in self._steady:

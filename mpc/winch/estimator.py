@@ -23,6 +23,7 @@ from models.plant import MEASUREMENTS
 from models.sensing import HEARD, MEASURED, Measurement
 
 from ..programme import ChangingGains, corrected, kalman_gain, prediction_covariance
+from .gate import SignalGate
 from .prediction import PredictionModel, constant_scales
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
@@ -76,6 +77,7 @@ class WinchEstimator:
             self._felt[k] = now * max(0.0, 1.0 - delays[name] / model.winch.sample_time)
         self._speed = np.zeros(model.size)
         self._speed[: model.winch.size] = model.winch.speed
+        self.gate = SignalGate(model)
         self.reset()
 
     def reset(self) -> None:
@@ -86,6 +88,8 @@ class WinchEstimator:
         self._drag = 0.0  # force of quadratic drag at the sample before [N]
         self._begun = False
         self._samples = 0
+        self.gate.reset()
+        self.gated = False  # whether the last sample had a number that was not believed
         self._gains.begin(self.covariance)
 
     @property
@@ -118,13 +122,21 @@ class WinchEstimator:
         self._begun = True
         # Age and validity of the telemetry come with it: old values are used as such, and a flag
         # that says "not valid" takes a signal out before its number is looked at.
-        y = shown[_AT] - self._rest - self._felt * winch.extra_drag(float(self._velocity @ ahead))
-        error = y - self._late(float(shown[_AGE])) @ ahead
-        there = np.isfinite(error)
+        age, reading = float(shown[_AGE]), shown[_AT]
+        expected = self._late(age) @ ahead + self._rest
+        error = reading - expected
+        error -= self._felt * winch.extra_drag(float(self._velocity @ ahead))
+        there = np.abs(error) < _HUGE
         if not shown[_FRESH] > 0.5:
             there[_TELEMETRY] = False
         if shown[_UNIT] <= 0.5:
             there[_REFERENCE] = False
+        reading = np.where(there, reading, math.nan)
+        error = np.where(there, error, 0.0)
+        variance = self._gains.innovations
+        believed = self.gate.passes(reading, expected, error, variance, there, age)
+        self.gated = bool((there > believed).any())
+        there = believed
         if not there.all():
             gain, error = self._gains.at(there), np.where(there, error, 0.0)
         elif self._samples < len(self._first):
