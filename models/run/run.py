@@ -54,10 +54,13 @@ class Timings:
     controller_max: float = math.nan
     #: How often something had to be replaced (a late controller, a NaN), by its name.
     fallbacks: Mapping[str, int] = field(default_factory=dict)
+    #: In how many samples the controller was not as usual, by its status.
+    statuses: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Make the mapping read-only."""
-        object.__setattr__(self, "fallbacks", MappingProxyType(dict(self.fallbacks)))
+        """Make the mappings read-only."""
+        for name in ("fallbacks", "statuses"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     @classmethod
     def of(
@@ -68,6 +71,7 @@ class Timings:
         duration: float,
         controller_seconds: npt.ArrayLike = (),
         fallbacks: Mapping[str, int] | None = None,
+        statuses: Mapping[str, int] | None = None,
     ) -> Timings:
         """Return the timings of a run of `duration` [s], from the time of each controller step."""
         wall = max(wall_seconds, 1e-9)  # a clock can stand still over a very short run
@@ -81,6 +85,7 @@ class Timings:
             controller_p99=float(p99),
             controller_max=float(seconds.max()) if seconds.size else math.nan,
             fallbacks=fallbacks or {},
+            statuses=statuses or {},
         )
 
 

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .control import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
+    from .control import (
+        HEARD,
+        STATUSES,
+        Controller,
+        Measurement,
+        Recursion,
+        holds_brake,
+        recursion_of,
+    )
     from .mru import (
         BIAS,
         Bias,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
 import casadi as ca
@@ -43,6 +44,17 @@ HEARD: tuple[str, ...] = (
     "reference.displacement",
     "reference.velocity",
     "reference.acceleration",
+)
+
+#: What a step of a controller may have been, and how a run tells of it; the first two are usual.
+STATUSES: Mapping[str, str] = MappingProxyType(
+    {
+        "engaged": "",
+        "limited": "",
+        "gated": "the controller did not believe a sensor",
+        "blind": "the controller has heard nothing of the payload for a second",
+        "fallback": "the controller had no answer in time and fell back on a simpler law",
+    }
 )
 
 _AT = {name: i for i, name in enumerate(HEARD)}
@@ -88,9 +100,9 @@ class Measurement:
 class Controller(Protocol):
     """Anything that makes drive commands out of measurements.
 
-    Two attributes are optional: `recursion`, a `Recursion` that does what `step` does, lets
+    Three attributes are optional: `recursion`, a `Recursion` that does what `step` does, lets
     the whole loop be compiled; `brake`, true for a controller that holds the drum with its
-    brake instead of its motor.
+    brake instead of its motor; `status`, one of `STATUSES`, says what the last step was.
     """
 
     @property

@@ -26,7 +26,7 @@ from typing_extensions import override
 
 from ..basics import FloatArray, SolverError, check_range, check_seed
 from ..run import Accumulator, Event, Run, Timings
-from ..sensing import Measurement, holds_brake
+from ..sensing import STATUSES, Measurement, holds_brake
 from .simulation import Simulation
 from .trips import Watch, trip_limits
 
@@ -145,6 +145,7 @@ def run_simulation(
             duration=store.seen * dt,
             controller_seconds=stepper.seconds,
             fallbacks=stepper.fallbacks,
+            statuses=stepper.statuses,
         ),
     )
 
@@ -160,6 +161,7 @@ class _Stepper:
         self.watch: Watch | None = Watch(limits, self._signals, self._sample_time)
         self.seconds: list[float] = []
         self.fallbacks: dict[str, int] = {}
+        self.statuses: dict[str, int] = {}
         self.events: list[Event] = []
 
     def run(self, state: FloatArray, rows: FloatArray, parameters: FloatArray, first: int) -> Ran:
@@ -216,12 +218,23 @@ class _FromPython(_Stepper):
                 self._held("not a number", time, "the controller returned no number")
         taken = clock.perf_counter() - began
         self.seconds.append(taken)
+        self._tell(time)
         if taken > self._deadline:
             late = f"the controller took {1e3 * taken:.3g} ms"
             self._held("late", time, f"{late}, its deadline is {1e3 * self._deadline:.3g} ms")
         elif math.isfinite(command):
             self._command = command
         return self._command
+
+    def _tell(self, time: float) -> None:
+        """Count a step that was not as usual to the controller, and tell of the first."""
+        status = getattr(self._controller, "status", "")
+        if not STATUSES.get(status):
+            return
+        if status not in self.statuses:
+            told = f"{STATUSES[status]} (told once)"
+            self.events.append(Event(time=time, kind="controller", text=told))
+        self.statuses[status] = self.statuses.get(status, 0) + 1
 
     def _held(self, kind: str, time: float, text: str) -> None:
         """Count a command that was not used, and tell of the first."""

@@ -97,6 +97,9 @@ class LinearMPC(WinchMPC):
         Limits of the drive; by default those of the case.
     name
         What it is called; by default after the predictor.
+    fallback
+        Who commands where the programme has no answer in time: any controller of the same sample
+        time, which hears every sample; by default the programme's own law without limits.
 
     Raises
     ------
@@ -153,10 +156,7 @@ class LinearMPC(WinchMPC):
         """Return the drive command, its static part included [V, rad/s or N m]."""
         began = clock.perf_counter()
         shown, winch, products = measurement.values, self.model.winch, self.products
-        self._counts["steps"] += 1
-        chi = self.estimator.update(
-            measurement, applied=self._held(float(shown[_TORQUE]), float(shown[_SPEED]))
-        )
+        chi = self._hear(measurement, time, self._held(float(shown[_TORQUE]), float(shown[_SPEED])))
         ahead, gradient, free = products.known(chi)
         self.estimator.advance(ahead)
         reference = self._reference(shown)
@@ -180,8 +180,11 @@ class LinearMPC(WinchMPC):
         if self.solved is not None:
             self._speeds = products.speeds(chi, self.solved.v)
             self._changes[:-1] = (self._speeds[1:] - self._speeds[:-1]) / self._lengths
+        if move is None and math.isfinite(self._other):
+            self._kept = math.nan
+            return self._passed_on()
         if move is None:
-            move = self._otherwise(speed)
+            move = self._otherwise(chi, reference)
         # At the edge of its window the drive is asked for more than its peak, so that it holds it
         # though the speed rises over the sample; the estimator is told so at the next one.
         if leaning:
@@ -191,7 +194,7 @@ class LinearMPC(WinchMPC):
         else:
             torque, self._kept = min(max(move, low[0]), high[0]) * self.programme.unit, math.nan
         command = winch.command(torque, speed)
-        self._asked = min(max(torque + winch.rest_torque, -self.window.peak), self.window.peak)
+        self._tell(min(max(torque + winch.rest_torque, -self.window.peak), self.window.peak))
         return min(max(command, -self.window.voltage), self.window.voltage)
 
     def _held(self, torque: float, speed: float) -> float:

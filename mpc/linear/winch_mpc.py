@@ -2,13 +2,14 @@
 
     case --> model, weights, regulator, estimator, limits          once
     m --> WinchEstimator --> chi ; set point, forecast, thermal cap      every sample
-    question --> QP --> first move, or that of the last good plan   every sample
+    question --> QP --> first move, or that of the unconstrained law  every sample
 
 What the two put to the solver, and what command they make of its answer, is their own.
 
-A programme may fail, be late, or have nothing finite to start from.  The drive then gets the move
-that the last good plan had for this moment, and when that plan has run out, the command that holds
-a load at rest: a DC drive brakes by its back-EMF, a speed regulator holds the drum.
+A programme may fail, be late, or have nothing finite to start from.  The drive then gets what the
+programme would give without limits, the regulator's feedback of the same estimate, or, where limits
+held the last good plan, for a second the move that this had for the moment.  A controller that was
+handed in as a fallback hears all the time, and its command is passed on instead.
 
 `DriveWindow` bounds the moves by the drive's torque, power, voltage and temperature.
 
@@ -32,7 +33,7 @@ from models.basics import FloatArray, InputError, check_range
 from models.case import Case
 from models.operation import Motion
 from models.plant import SPEED_BAND, DriveLimits
-from models.sensing import HEARD, Measurement
+from models.sensing import HEARD, Controller, Measurement
 
 from ..forecast import AdaptiveAR, Forecast, PerfectPreview, Predictor
 from ..programme import Condensed, QPSolution, SoftQP, default_blocking, kkt_residual
@@ -41,6 +42,7 @@ from ..winch import (
     SampledWinch,
     Weights,
     WinchEstimator,
+    feedback_row,
     plan_model,
     prediction_model,
     regulator,
@@ -57,6 +59,7 @@ _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own
 _HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
 _PROVED = 1e-6  # residual of the optimality conditions
 _IN_BAND = 3.0  # [rad/s]
+_STALE = 1.0  # of a plan [s]
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
 _REFERENCE = HEARD.index("reference.displacement")
@@ -83,6 +86,7 @@ class WinchOptions(TypedDict, total=False):
     limits: DriveLimits | None
     name: str | None
     prove: bool
+    fallback: Controller | None
 
 
 class WinchMPC(ABC):
@@ -92,7 +96,7 @@ class WinchMPC(ABC):
     ----------
     case, horizon, sample_time, blocking, weights, predictor, masses
         As for `LinearMPC`.
-    minimum_tension, excursion, thermal, deadline, prove, limits, name
+    minimum_tension, excursion, thermal, deadline, prove, limits, name, fallback
         As for `LinearMPC`.
 
     Attributes
@@ -138,6 +142,7 @@ class WinchMPC(ABC):
         limits: DriveLimits | None = None,
         name: str | None = None,
         prove: bool = False,
+        fallback: Controller | None = None,
     ) -> None:
         T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
         if horizon is None:
@@ -167,7 +172,6 @@ class WinchMPC(ABC):
         limits = DriveLimits.from_case(case) if limits is None else limits
         self.soft_limits = _soft_limits(self.model, limits, least, excursion)
         self._blocks = tuple(int(b) for b in blocks)
-        self._of = np.repeat(np.arange(len(blocks)), self._blocks)  # block of each sample
         self.predictor, word = _predictor(case, predictor, T, self.horizon)
         self.name = word if name is None else name
         # A path that comes from outside tells where the sea is at its end, if it is known how well
@@ -175,6 +179,13 @@ class WinchMPC(ABC):
         self._sea_covariance = None if self.predictor is None else self.estimator.sea_covariance
         unit = case.winch.drive.torque_peak
         self.window = DriveWindow(self.model.winch, limits, len(blocks), unit)
+        if fallback is not None and not math.isclose(fallback.sample_time, T):
+            raise InputError(
+                f"{_OWNER}: fallback must have the sample time {T:g} s, got "
+                f"{fallback.sample_time:g} s"
+            )
+        self._of = np.repeat(np.arange(len(blocks)), self._blocks)  # block of each sample
+        self._fallback, self._unlimited = fallback, feedback_row(self.regulator, self.model)
         self._deadline = math.inf if deadline is None else deadline
         self._prove = prove
         self._budget = TorqueBudget(case, T, self.horizon) if thermal else None
@@ -186,8 +197,20 @@ class WinchMPC(ABC):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Steps, iterations of the solver, and how often which fallback was used."""
+        """Steps, iterations of the solver, answers that were late or unproved, and statuses."""
         return dict(self._counts)
+
+    @property
+    def status(self) -> str:
+        """What the last step was, as `models.sensing.STATUSES` has it."""
+        if self.solved is None and self._counts["steps"]:
+            return "fallback"
+        if self.estimator.blind:
+            return "blind"
+        if self.estimator.gated:
+            return "gated"
+        full = abs(self._asked) >= self.window.peak * (1.0 - _EDGE)
+        return "limited" if full else "engaged"
 
     def foresee(self, motion: Motion) -> None:
         """Give the record to come to a predictor that needs it."""
@@ -203,13 +226,15 @@ class WinchMPC(ABC):
             self._budget.reset()
         if self.predictor is not None:
             self.predictor.reset()
-        self._plan: FloatArray | None = None  # the last good moves, and how old they are
+        self._plan: FloatArray | None = None  # the last good moves if limited, how old they are
         self._age = 0
+        if self._fallback is not None:
+            self._fallback.reset()
         self._speeds = np.zeros(len(self._blocks))  # at the start of each move, by the last plan
         self._asked = self.model.winch.rest_torque  # of the drive at the sample before [N m]
         self._set_point = np.zeros(2)  # displacement [m] and velocity [m/s], the last finite one
         self._counts = dict.fromkeys(
-            ("steps", "iterations", "late", "shifted", "safe", "unproved"), 0
+            ("steps", "iterations", "late", "unproved", "gated", "blind", "fallback"), 0
         )
         self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
         self.solved: QPSolution | None = None
@@ -285,18 +310,44 @@ class WinchMPC(ABC):
             self._counts["late"] += 1
             return None
         self.solved = solved
-        self._plan, self._age = solved.v, 0
+        soon = solved.multipliers[: self._of[round(_STALE / self.sample_time)]]
+        self._plan, self._age = solved.v if soon.any() else None, 0
         return float(solved.v[0])
 
-    def _otherwise(self, speed: float) -> float:
-        """Return the move of the last plan for this sample, or the one that holds the drum."""
-        self._age += 1
-        if self._plan is not None and self._age < len(self._of):
-            self._counts["shifted"] += 1
-            return float(self._plan[self._of[self._age]])
-        self._counts["safe"] += 1
+    def _otherwise(self, chi: FloatArray, reference: FloatArray) -> float:
+        """Return the move where the programme has no answer in time.
+
+        It is that of the law without limits, which the programme is as long as nothing limits it;
+        where the last plan was limited, that of the plan for this moment, for a second: cut off at
+        the limits the law swings without end.
+        """
         winch = self.model.winch
-        return winch.torque(winch.rest_command, speed) / self.programme.unit
+        self._age += 1
+        if self._plan is not None and self._age * self.sample_time < _STALE:
+            return float(self._plan[self._of[self._age]])
+        asked = self._unlimited[: winch.size] @ winch.moved @ reference
+        return float(asked - self._unlimited @ chi) / self.programme.unit
+
+    def _hear(self, measurement: Measurement, time: float, applied: float) -> FloatArray:
+        """Return the estimate of a sample, (n,), and let the fallback hear it too."""
+        self._counts["steps"] += 1
+        self._other = math.nan
+        if self._fallback is not None:
+            self._other = float(self._fallback.step(measurement, time))
+        return self.estimator.update(measurement, applied=applied)
+
+    def _passed_on(self) -> float:
+        """Return the command of the fallback for this sample."""
+        winch, peak = self.model.winch, self.window.peak
+        torque = winch.torque(self._other, self.estimator.speed) + winch.rest_torque
+        self._tell(min(max(torque, -peak), peak))
+        return self._other
+
+    def _tell(self, torque: float) -> None:
+        """Take note of the torque asked of the drive [N m], and count what the step was."""
+        self._asked = torque
+        if (status := self.status) in self._counts:
+            self._counts[status] += 1
 
 
 def _soft_limits(

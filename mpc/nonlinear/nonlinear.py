@@ -168,8 +168,7 @@ class NonlinearMPC(WinchMPC):
         """Return the drive command, its static part included [V, rad/s or N m]."""
         began = clock.perf_counter()
         shown, winch, shooting = measurement.values, self.model.winch, self.shooting
-        self._counts["steps"] += 1
-        chi = self.estimator.update(measurement, applied=self._uncut(float(shown[_APPLIED])))
+        chi = self._hear(measurement, time, self._uncut(float(shown[_APPLIED])))
         ahead, known = shooting.known(chi)
         self.estimator.advance(ahead)
         reference = self._reference(shown)
@@ -193,12 +192,15 @@ class NonlinearMPC(WinchMPC):
             if found is None:
                 break
             move = found
-        if move is None:
-            move = self._otherwise(speed)
-        torque = min(max(move, float(low[0])), float(high[0])) * self.programme.unit
-        command = self._command(torque, speed, chi, ends)
-        self._asked = torque + winch.rest_torque
-        command = min(max(command, -self.window.voltage), self.window.voltage)
+        if move is None and math.isfinite(self._other):
+            self._cut, command = None, self._passed_on()
+        else:
+            if move is None:
+                move = self._otherwise(chi, reference)
+            torque = min(max(move, float(low[0])), float(high[0])) * self.programme.unit
+            command = self._command(torque, speed, chi, ends)
+            self._tell(torque + winch.rest_torque)
+            command = min(max(command, -self.window.voltage), self.window.voltage)
         answered = clock.perf_counter()
         # The command is known; the rest needs no measurement, and has what is left of the time.
         self.prepare()

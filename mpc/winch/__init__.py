@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .gate import SignalGate
     from .planning import plan_model
     from .prediction import PredictionModel, ProcessNoise, prediction_model, with_noise
-    from .regulation import regulator
+    from .regulation import feedback_row, regulator
     from .sampled import SampledWinch, command_law, sampled_winch
     from .weights import Weights, tune_weights
 else:

@@ -38,6 +38,7 @@ _STARTING = 10.0  # in which the gain comes to its steady value [s]
 _AT_FIRST = (0.3, 0.1, 0.01, 0.3)
 _LOWER = 1.0  # by which the load may hang lower or higher at first [m]
 _HUGE = 1e12
+_BLIND = 1.0  # without the payload's signals [s]
 _LATER = 1e-3  # of a sample: an age that is no other than usual
 
 
@@ -89,8 +90,14 @@ class WinchEstimator:
         self._begun = False
         self._samples = 0
         self.gate.reset()
-        self.gated = False  # whether the last sample had a number that was not believed
+        self.gated = False  #: Whether the last sample had a number that was not believed.
+        self._unheard = 0  # samples since the payload was last heard of
         self._gains.begin(self.covariance)
+
+    @property
+    def blind(self) -> bool:
+        """Whether nothing has been heard of the payload's motion for a second."""
+        return self._unheard * self.model.winch.sample_time > _BLIND
 
     @property
     def sea_covariance(self) -> FloatArray:
@@ -137,6 +144,7 @@ class WinchEstimator:
         believed = self.gate.passes(reading, expected, error, variance, there, age)
         self.gated = bool((there > believed).any())
         there = believed
+        self._unheard = 0 if there[_TELEMETRY].any() else self._unheard + 1
         if not there.all():
             gain, error = self._gains.at(there), np.where(there, error, 0.0)
         elif self._samples < len(self._first):

@@ -80,6 +80,7 @@ def _run(run: Run) -> dict[str, Any]:
         "quantities": {name: q.value for name, q in run.statistics.quantities.items()},
         "events": [{"time": e.time, "kind": e.kind, "text": e.text} for e in run.events],
         "fallbacks": dict(timings.fallbacks),
+        "statuses": dict(timings.statuses),
         "wall_seconds": timings.wall_seconds,
         "times_real_time": timings.real_time_factor,
         "controller_step": {

@@ -196,6 +196,13 @@ def tree(runs: Runs) -> list[str]:
     fallbacks = sum(sum(run.timings.fallbacks.values()) for run in runs)
     if fallbacks:
         lines.append(f"{count(fallbacks, 'command')} of the controller could not be used")
+    spent: dict[str, float] = {}
+    for run in runs:
+        for status, samples in run.timings.statuses.items():
+            spent[status] = spent.get(status, 0.0) + samples * run.sample_time
+    if spent:
+        told_of = ", ".join(f"{status} for {duration(time)}" for status, time in spent.items())
+        lines.append(f"the controller was {told_of}")
     return [*lines, speed_of(runs)]
 
 

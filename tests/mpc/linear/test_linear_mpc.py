@@ -12,13 +12,16 @@ from former_cases import load_case
 from mpc_cases import WEIGHTS, case_of, controller_of
 from sea_predictor import SeaPredictor
 
+import models
 import stillhook as sh
+from models.operation import scenario_named
 from models.plant import DriveLimits
 from models.sensing import HEARD, Measurement
 from models.simulation import prepare
 from mpc.linear import WATCHED, LinearMPC, path_of_sea, sea_at_end
 from mpc.programme import SoftQP, kkt_residual
 from mpc.winch.regulation import feedback_row
+from synth.controllers import VelocityFeedForward
 
 _NAN = float("nan")
 
@@ -247,9 +250,9 @@ def test_the_path_tells_the_state_of_the_sea_at_its_end():
     assert np.std(errors) < 0.25 * np.std(without)
 
 
-def run_of(controller: LinearMPC, seconds: float = 120.0, **options: object):
+def run_of(controller: object, seconds: float = 120.0, case: object = None, **options: object):
     wanted = {"seeds": [1], "duration": seconds, "settle": 40.0, **options}
-    return sh.simulate(controller.case, controller, **wanted).runs[0]  # type: ignore[arg-type]
+    return sh.simulate(controller.case if case is None else case, controller, **wanted).runs[0]  # type: ignore[arg-type]
 
 
 def test_every_answer_of_a_saturated_run_is_optimal_and_within_the_drives_limits():
@@ -277,7 +280,7 @@ def test_every_answer_of_a_saturated_run_is_optimal_and_within_the_drives_limits
     assert run.statistics.value("payload rms") < 0.4
     assert np.abs(commands).max() <= 805.0
     counts = controller.counts
-    assert counts["shifted"] == counts["safe"] == counts["late"] == 0
+    assert counts["fallback"] == counts["late"] == 0
     torque = run["motor.torque"]
     assert np.abs(torque).max() <= 11_880.0 * (1.0 + 1e-9)
     assert np.mean(np.abs(torque) > 11_000.0) > 0.2
@@ -460,46 +463,98 @@ def test_whatever_is_measured_every_command_is_finite_and_within_limits(name):
     assert counts["steps"] == (k % 50) + 1
 
 
-def test_without_a_plan_it_goes_on_with_the_last_and_then_holds_the_drum():
-    controller = controller_of("thesis-1975", 1.9)
-    run_of(controller, 60.0)
-    plan = controller.solved
-    assert plan is not None
-    winch = controller.model.winch
-    calm = Measurement.of(
-        {
-            "payload.valid": 1.0,
-            "mru.valid": 1.0,
-            "drive.applied": winch.rest_command,
-            "rope.tension": winch.rest_tension,
-        }
+CRANE = models.load_case("subsea-crane")
+
+
+class Failing:
+    """A controller whose solver has no answer where `fails(time)`."""
+
+    def __init__(self, controller, fails):
+        self.name, self.sample_time = controller.name, controller.sample_time
+        self._controller, self._fails, self._time = controller, fails, 0.0
+        solve = controller.qp.solve
+        controller.qp.solve = lambda *asked: replace(solve(*asked), ok=not self._fails(self._time))
+
+    @property
+    def status(self):
+        return self._controller.status
+
+    def reset(self):
+        self._controller.reset()
+
+    def step(self, measurement, time):
+        self._time = time
+        return self._controller.step(measurement, time)
+
+
+def test_without_an_answer_the_law_without_limits_goes_on_as_if_nothing_were():
+    """Where nothing saturates the programme is that law: a drum that is held leaves 800 mm."""
+    left = []
+    for fails in (lambda time: False, lambda time: time > 30.0):
+        controller = LinearMPC(CRANE, weights=WEIGHTS["subsea-crane"])
+        run = run_of(Failing(controller, fails), 90.0, case=CRANE)
+        left.append(run.statistics.value("tracking error rms"))
+        counts, told = controller.counts, run.timings.statuses
+        assert counts["fallback"] == told.get("fallback", 0)
+    assert counts["fallback"] == counts["steps"] - 601
+    assert left[1] < 1.2 * left[0]
+    assert [event.text for event in run.events if event.kind == "controller"][-1].startswith(
+        "the controller had no answer in time"
     )
-    controller.qp.solve = lambda *_: replace(plan, ok=False)  # type: ignore[method-assign]
-    before = controller.counts
-    blocks = np.repeat(plan.v, controller.programme.blocks)
-    for k in range(controller.programme.steps + 3):
-        command = controller.step(calm, 0.05 * k)
-        given = winch.torque(command, controller.estimator.speed) / controller.programme.unit
-        if k + 1 < len(blocks):
-            low, high = controller.window.bounds(
-                controller.estimator.speed, np.zeros(len(plan.v)), math.inf, controller._changes
-            )
-            kept = min(max(blocks[k + 1], low[0]), high[0])
-            if low[0] + 1e-6 < kept < high[0] - 1e-6:
-                assert given == pytest.approx(kept, abs=1e-9)
-        else:
-            assert command == pytest.approx(winch.rest_command)
-    counts = controller.counts
-    assert counts["shifted"] - before["shifted"] == len(blocks) - 1
-    assert counts["safe"] - before["safe"] == 4
 
 
-def test_a_deadline_that_is_missed_is_counted_and_the_last_plan_shifted():
+def test_a_plan_that_the_limits_held_goes_on_for_a_second():
+    """The law alone is cut off at the limits and swings: it leaves half a metre here."""
+    controller = controller_of("thesis-1975", 1.9)
+    rng = np.random.default_rng(3)
+    failing = Failing(controller, lambda time: rng.random() < 0.2)
+    left = run_of(failing, 120.0, case=controller.case).statistics.value("tracking error rms")
+    assert controller.counts["fallback"] > 400
+    assert left < 0.05
+
+
+def test_a_controller_that_was_handed_in_takes_over_and_has_heard_everything():
+    case = case_of("thesis-1975", 2.43)
+    alone = VelocityFeedForward(case, sample_time=0.05)
+    left = []
+    for given in (None, VelocityFeedForward(case, sample_time=0.05)):
+        controller = LinearMPC(case, weights=WEIGHTS["thesis-1975"], fallback=given)
+        run = run_of(Failing(controller, lambda time: True), 90.0, case=case)
+        left.append(run.statistics.value("tracking error rms"))
+        assert controller.counts["fallback"] == controller.counts["steps"]
+    usual = run_of(alone, 90.0, case=case).statistics.value("tracking error rms")
+    assert left[1] == pytest.approx(usual, rel=1e-6)
+    assert left[1] < 0.5 * left[0]
+    with pytest.raises(sh.InputError, match=r"fallback must have the sample time 0.05 s, got 0.02"):
+        LinearMPC(
+            case,
+            weights=WEIGHTS["thesis-1975"],
+            fallback=VelocityFeedForward(case, sample_time=0.02),
+        )
+
+
+def test_a_deadline_that_is_missed_is_counted_and_the_drive_has_its_command():
     controller = controller_of("thesis-1975", 1.9, deadline=1e-7)
-    run_of(controller, 20.0, settle=5.0)
+    run = run_of(controller, 20.0, settle=5.0)
     counts = controller.counts
-    assert counts["late"] + counts["safe"] + counts["shifted"] >= counts["steps"]
-    assert counts["safe"] == counts["steps"]
+    assert counts["fallback"] == counts["steps"] == run.timings.statuses["fallback"]
+    assert run.completed
+
+
+def test_a_run_tells_how_long_its_controller_was_blind():
+    controller = LinearMPC(CRANE, weights=WEIGHTS["subsea-crane"])
+    runs = sh.simulate(
+        CRANE,
+        controller,
+        scenario=replace(scenario_named("hold", CRANE), telemetry_outages=((50.0, 60.0),)),
+        seeds=[1],
+        duration=80.0,
+        settle=20.0,
+    )
+    # Told after a second, and over with the first telegram.
+    assert 170 <= runs[0].timings.statuses["blind"] <= 185
+    assert controller.counts["blind"] == runs[0].timings.statuses["blind"]
+    assert "the controller was blind for" in str(runs)
 
 
 def test_the_thermal_budget_keeps_the_windings_within_their_rating():
@@ -603,7 +658,7 @@ def test_a_set_point_that_is_no_number_keeps_its_place_and_the_estimate():
     run = run_of(Told(), 120.0)
     late = run.time > 50.0
     assert np.abs(run["payload.displacement"][late] - 1.0).max() < 0.02
-    assert controller.counts["safe"] == controller.counts["shifted"] == 0
+    assert controller.counts["fallback"] == 0
     assert min(np.abs(state).max() for state in states[400:]) > 0.0
 
 

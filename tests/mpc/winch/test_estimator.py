@@ -256,4 +256,4 @@ def test_who_hears_the_load_by_nothing_does_as_well_as_feed_forward():
         rms[own.name] = float(np.sqrt(np.mean(np.square(found))))
     deaf, feed_forward = rms.values()
     assert deaf < 1.2 * feed_forward
-    assert controller.counts["safe"] == controller.counts["shifted"] == 0
+    assert controller.counts["fallback"] == 0
