@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .discrete import hermite_hold, noisy_hold, root_of, zero_order_hold
+    from .discrete import hermite_hold, late_hold, noisy_hold, root_of, zero_order_hold
     from .drag import consistent_drag, settled_drag, stochastic_equivalent
     from .drive import SPEED_BAND, DriveLimits
     from .equations import MEASUREMENTS, MOTION, parameter_values, weighed_tension

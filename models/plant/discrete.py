@@ -4,10 +4,14 @@ Each is one matrix exponential of the system with what drives it behind it (C. V
 integrals involving the matrix exponential", IEEE TAC 23, 1978).
 """
 
+import math
+
 import numpy as np
 import scipy.linalg
 
 from ..basics import FloatArray
+
+_ROUNDING = 1e-9  # of a sample
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -23,6 +27,15 @@ def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray
     augmented[:n, n:] = B
     exponential = scipy.linalg.expm(augmented * dt)
     return exponential[:n, :n], exponential[:n, n:]
+
+
+def late_hold(samples: float) -> tuple[int, float]:
+    """Return how many held inputs are on their way, and how long the oldest acts [samples].
+
+    Of inputs that are late by so many samples.  Rounding of a multiple of the sample time is none.
+    """
+    count = math.ceil(samples - _ROUNDING)
+    return count, min(1.0, samples - count + 1.0)
 
 
 def hermite_hold(

@@ -24,7 +24,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from ..basics import FloatArray, check_seed
 from ..case import Case
-from ..plant import ShapingFilter, noisy_hold, weighed_tension
+from ..plant import ShapingFilter, late_hold, noisy_hold, weighed_tension
 from ..rig import Encoder, LoadCell, PayloadSensor
 from .control import HEARD
 from .draws import SENSOR_NOISE, draw
@@ -241,9 +241,7 @@ class SensorModel:
 
     def _late(self, name: str) -> tuple[int, float]:
         """Return how many true values are remembered, and the weight of the oldest of them."""
-        samples = self.payload.latency(name) / self.sample_time
-        count = math.ceil(samples - _ROUNDING)
-        return count, min(1.0, samples - count + 1.0)
+        return late_hold(self.payload.latency(name) / self.sample_time)
 
     def _own_states(self, name: str) -> list[str]:
         """Return the names of the states of one payload sensor, in the order of `initial`."""

@@ -15,7 +15,6 @@ The controller either is part of it, or is called in between: then the recursion
 `measure` and `advance`.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -25,13 +24,12 @@ import numpy as np
 
 from ..basics import FloatArray
 from ..case import Case
-from ..plant import MOTION, Plant
+from ..plant import MOTION, Plant, late_hold
 from ..sensing import Recursion, SensorModel
 from .integrate import StepChoice, braked_step, disturbances
 from .rows import FLAGS
 
 HOOK = "hook"
-_ROUNDING = 1e-9  # of a sample
 _SATURATED = 1e-9  # relative difference of asked and applied command that is no rounding [-]
 _OWN = (
     "drive.hold",
@@ -110,14 +108,15 @@ def build_closed_loop(
     recursion
         The controller, if it is one.
     """
-    waiting, share = _waits(case.winch.drive.command_delay / step.sample_time)
+    waiting, share = late_hold(case.winch.drive.command_delay / step.sample_time)
+    sends = waiting + 1 if waiting else 0  # what is remembered: up to what acted last
     motions = (HOOK, *dict.fromkeys(name.split(".")[0] for name in plant.disturbances[4:]))
     nx, ns = len(plant.states), len(sensors.states)
     begin = np.zeros(0) if recursion is None else recursion.initial
     names = (
         *(f"plant.{name}" for name in plant.states),
         *(f"sensor.{name}" for name in sensors.states),
-        *(f"drive.command.{j}" for j in range(waiting)),
+        *(f"drive.command.{j}" for j in range(sends)),
         "drive.last_command",
         "motor.temperature",
         *(f"controller.{i}" for i in range(begin.size)),
@@ -133,7 +132,7 @@ def build_closed_loop(
     kind = cast("type[ca.SX]", ca.SX if step.substeps <= 2 else ca.MX)
     s, r = kind.sym("s", len(names)), kind.sym("r", columns)
     p, asked = kind.sym("p", len(values)), kind.sym("u")
-    drive = nx + ns + waiting  # where the last command is that the drive was told
+    drive = nx + ns + sends  # where the last command is that the drive was told
     x, of_sensors, of_controller = s[:nx], s[nx : nx + ns], s[drive + 2 :]
     on_the_way, last, rise = s[nx + ns : drive], s[drive], s[drive + 1]
     moved, sensed, flags = r[:width], r[ends : ends + len(sensors.row)], r[-len(FLAGS) :]
@@ -142,23 +141,27 @@ def build_closed_loop(
     logged, signals = _log(plant, sensors, tuple(values), len(motions))
     one_step = braked_step(plant, tuple(values), len(motions), step.step)
     raw, applied = look(x, last, moved, p)
+
+    def arriving(sent: Sequence[ca.SX] | ca.SX) -> ca.SX:
+        """Return the mean of what arrives within a sample, of commands up to it, newest first."""
+        return share * sent[waiting] + (1.0 - share) * sent[waiting - 1]
+
     # What the drive has left out of a command that was on its way is told of the one asked for
     # last: a controller that compares the two must not take the delay for a limit.
-    late = on_the_way[0] - last if waiting else 0.0
+    # (A drive that is not engaged follows none: it has left out all.)
+    late = on_the_way[0] - arriving(on_the_way) if waiting else 0.0
     seen, m = sensors.function(of_sensors, raw, sensed, applied + late)
 
     def sample(command: ca.SX, seen: ca.SX, controller: ca.SX) -> list[ca.SX]:
         """Return the state after the sample and the log at its start."""
         sent = [command, *(ca.vertsplit(on_the_way) if waiting else ())]
-        told = sent[0]
-        if waiting:  # the mean of what arrives within the sample
-            told = share * sent[waiting] + (1.0 - share) * sent[waiting - 1]
+        told = arriving(sent) if waiting else command
         u, warmer, log = logged(x, told, rise, moved, sensed, flags, p)
         after = x
         for j in range(step.substeps):
             both = r[j * width : (j + 2) * width]
             after = one_step(after, u, both, flags[FLAGS.index("brake")], p)
-        return [ca.vertcat(after, seen, *sent[:waiting], u, warmer, controller), log]
+        return [ca.vertcat(after, seen, *sent[:sends], u, warmer, controller), log]
 
     # With the controller inside nothing leaves the recursion in a sample; otherwise it is cut where
     # the measurement goes out and the command comes in.
@@ -189,17 +192,11 @@ def build_closed_loop(
             [
                 start,
                 sensors.initial(np.asarray(at_rest).ravel()),
-                [*(hold,) * waiting, hold, 0.0],
+                [*(hold,) * sends, hold, 0.0],
                 begin,
             ]
         ),
     )
-
-
-def _waits(samples: float) -> tuple[int, float]:
-    """Return how many commands are on their way, and the weight of the oldest of them."""
-    count = math.ceil(samples - _ROUNDING)
-    return count, min(1.0, samples - count + 1.0)
 
 
 def _look(plant: Plant, sensors: SensorModel, names: Sequence[str], motions: int) -> ca.Function:
