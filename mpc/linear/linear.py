@@ -149,7 +149,9 @@ class LinearMPC(WinchMPC):
         """Forget every earlier measurement."""
         super().reset()
         self._changes = np.zeros(len(self.programme.blocks))
-        self._kept = math.nan
+        # Of each command on its way, the newest first: the torque it holds, and itself.
+        self._past = [(math.nan, 0.0)] * (self.model.winch.waiting + 1)
+        self._before = 0.0  # the motor's speed at the last sample [rad/s]
 
     @override
     def step(self, measurement: Measurement, time: float) -> float:
@@ -159,6 +161,8 @@ class LinearMPC(WinchMPC):
         chi = self._hear(measurement, time, self._held(float(shown[_TORQUE]), float(shown[_SPEED])))
         ahead, gradient, free = products.known(chi)
         self.estimator.advance(ahead)
+        if winch.waiting:
+            self._before = float(winch.speed @ chi[: winch.size])
         reference = self._reference(shown)
         if reference.any():
             gradient, free = products.shifted(gradient, free, reference)
@@ -181,31 +185,37 @@ class LinearMPC(WinchMPC):
             self._speeds = products.speeds(chi, self.solved.v)
             self._changes[:-1] = (self._speeds[1:] - self._speeds[:-1]) / self._lengths
         if move is None and math.isfinite(self._other):
-            self._kept = math.nan
-            return self._passed_on()
+            command = self._passed_on()
+            self._past = [(math.nan, command), *self._past[:-1]]
+            return command
         if move is None:
             move = self._otherwise(chi, reference)
         # At the edge of its window the drive is asked for more than its peak, so that it holds it
         # though the speed rises over the sample; the estimator is told so at the next one.
         if leaning:
-            torque, self._kept = self.window.asked(
+            torque, kept = self.window.asked(
                 move, float(low[0]), float(high[0]), float(self._changes[0])
             )
         else:
-            torque, self._kept = min(max(move, low[0]), high[0]) * self.programme.unit, math.nan
-        command = winch.command(torque, speed)
+            torque, kept = min(max(move, low[0]), high[0]) * self.programme.unit, math.nan
+        command = self._given(winch.command(torque, speed))
+        self._past = [(kept, command), *self._past[:-1]]
         self._tell(min(max(torque + winch.rest_torque, -self.window.peak), self.window.peak))
-        return min(max(command, -self.window.voltage), self.window.voltage)
+        return command
 
     def _held(self, torque: float, speed: float) -> float:
         """Return the command that does as much as the torque held over the last sample.
 
         The drive was asked to hold its peak, and shows that it still did at the end [N m], at a
-        motor speed [rad/s]; NaN if it did not.
+        motor speed [rad/s]; NaN if it did not.  Of late commands that is said of the newest one, as
+        the drive says what it has cut.
         """
-        winch, before = self.model.winch, self.estimator.speed
-        if not abs(torque - winch.rest_torque - self._kept) < _SAME * self.window.peak:
+        winch, share = self.model.winch, self._share
+        before = self._before if winch.waiting else self.estimator.speed
+        (kept, oldest), (other, next_one) = self._past[-1], self._past[-2 if share < 1.0 else -1]
+        if kept != other or not abs(torque - winch.rest_torque - kept) < _SAME * self.window.peak:
             return math.nan
+        told = share * oldest + (1.0 - share) * next_one
         # A torque that is held does as much as one that falls to as much below it.
         fall = 0.5 * winch.gain * winch.back * (speed - before)
-        return winch.command(self._kept + fall, before)
+        return winch.command(kept + fall, before) + (self._past[0][1] - told)

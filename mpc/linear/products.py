@@ -85,10 +85,10 @@ class Products:
         # A load that is to be elsewhere, or to move: everything is counted from there, but the
         # limits on speed and command are not.
         moved_free = p.rows[:, h.state] @ winch.moved
-        own = winch.speed @ winch.moved
+        own = {"speed": winch.speed, "command": winch.back * winch.reckoned}
         for k, name in enumerate(names):
-            if name in ("speed", "command"):
-                moved_free[k] -= own * (winch.back if name == "command" else 1.0)
+            if name in own:
+                moved_free[k] -= own[name] @ winch.moved
         return cls(
             size=model.size,
             moves=nb,

@@ -32,7 +32,7 @@ import numpy as np
 from models.basics import FloatArray, InputError, check_range
 from models.case import Case
 from models.operation import Motion
-from models.plant import SPEED_BAND, DriveLimits
+from models.plant import SPEED_BAND, DriveLimits, late_hold
 from models.sensing import HEARD, Controller, Measurement
 
 from ..forecast import AdaptiveAR, Forecast, PerfectPreview, Predictor
@@ -188,6 +188,8 @@ class WinchMPC(ABC):
         self._fallback, self._unlimited = fallback, feedback_row(self.regulator, self.model)
         self._deadline = math.inf if deadline is None else deadline
         self._prove = prove
+        # For how much of a sample the oldest command on its way still acts.
+        self._share = late_hold(case.winch.drive.command_delay / T)[1]
         self._budget = TorqueBudget(case, T, self.horizon) if thermal else None
 
     @property
@@ -314,6 +316,13 @@ class WinchMPC(ABC):
         self._plan, self._age = solved.v if soon.any() else None, 0
         return float(solved.v[0])
 
+    def _given(self, command: float) -> float:
+        """Return a command within the voltage, of which the estimator hears where it is late."""
+        command = min(max(command, -self.window.voltage), self.window.voltage)
+        if self.model.winch.waiting:
+            self.estimator.given = command
+        return command
+
     def _otherwise(self, chi: FloatArray, reference: FloatArray) -> float:
         """Return the move where the programme has no answer in time.
 
@@ -341,7 +350,7 @@ class WinchMPC(ABC):
         winch, peak = self.model.winch, self.window.peak
         torque = winch.torque(self._other, self.estimator.speed) + winch.rest_torque
         self._tell(min(max(torque, -peak), peak))
-        return self._other
+        return self._given(self._other)
 
     def _tell(self, torque: float) -> None:
         """Take note of the torque asked of the drive [N m], and count what the step was."""

@@ -59,7 +59,7 @@ def winch_programme(
         regulator,
         output=winch.payload,
         scale=model.waves[0] ** 2,
-        speed=winch.speed,
+        speed=winch.reckoned,
         signals=signals,
     )
 
@@ -116,7 +116,7 @@ def _rows(
     tension[horizon.constants] += winch.tension_from_constants
     found = [("speed", speed), ("tension", tension), ("payload", winch.payload @ S)]
     if j < horizon.steps:
-        command = winch.back * speed
+        command = winch.back * (winch.reckoned @ S)
         command[horizon.move(j)] += horizon.unit / winch.gain
         found.append(("command", command))
     return found

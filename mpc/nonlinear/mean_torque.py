@@ -51,7 +51,14 @@ def mean_torque(winch: SampledWinch) -> tuple[SampledWinch, Drift]:
 
     With theta the motor's angle, the demand d_0 = b (u - u_rest - K omega_0) at the start has the
     mean d = d_0 - b K ((theta_1 - theta_0)/T - omega_0), which is linear in all that is known.
+    A command that comes late acts on speeds which are not: there the motor alone counts.
     """
+    if winch.waiting:
+        T, falls = winch.sample_time, winch.gain * winch.back
+        alone = falls * T / winch.data.inertia
+        mean = alone / -math.expm1(-alone) - 1.0 if alone > 0.0 else 0.0
+        drift = replace(Drift.none(winch.size), mean=mean)
+        return replace(winch, B=winch.B * (1.0 + mean)), drift
     angle = winch.plant.states.index("motor.angle")
     n, T, falls = winch.size, winch.sample_time, winch.gain * winch.back
     turned = (winch.A - np.eye(n))[angle] / T - winch.speed

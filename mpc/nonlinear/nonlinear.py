@@ -28,6 +28,7 @@ from .stage import force_law, make_stage
 
 _OWNER = "nonlinear predictive control"
 _APPLIED = HEARD.index("drive.applied")
+_NONE = (0.0, 0.0, -1.0)  # a command of which the drive cuts nothing
 
 
 class NonlinearMPC(WinchMPC):
@@ -158,7 +159,7 @@ class NonlinearMPC(WinchMPC):
         self.qp.change(self._resting.H, self._rows.copy())
         super().reset()
         self._counts["forgotten"] = 0
-        self._cut: tuple[float, float, float] | None = None
+        self._cuts = [_NONE] * (self.model.winch.waiting + 1)
         self.seconds: Mapping[str, float] = {"feedback": 0.0, "preparation": 0.0}
         self._forget()
         self._prepare()
@@ -193,14 +194,14 @@ class NonlinearMPC(WinchMPC):
                 break
             move = found
         if move is None and math.isfinite(self._other):
-            self._cut, command = None, self._passed_on()
+            self._cuts = [_NONE, *self._cuts[:-1]]
+            command = self._passed_on()
         else:
             if move is None:
                 move = self._otherwise(chi, reference)
             torque = min(max(move, float(low[0])), float(high[0])) * self.programme.unit
-            command = self._command(torque, speed, chi, ends)
+            command = self._given(self._command(torque, speed, chi, ends))
             self._tell(torque + winch.rest_torque)
-            command = min(max(command, -self.window.voltage), self.window.voltage)
         answered = clock.perf_counter()
         # The command is known; the rest needs no measurement, and has what is left of the time.
         self.prepare()
@@ -230,7 +231,7 @@ class NonlinearMPC(WinchMPC):
             If they still change by more than the tolerance.
         """
         _, known = self.shooting.known(chi)
-        speed = float(self.model.winch.speed @ chi[: self.model.winch.size])
+        speed = float(self.model.winch.reckoned @ chi[: self.model.winch.size])
         low, high = self.hard_bounds(speed)
         moves = np.full(len(self.programme.blocks), math.inf)
         for _ in range(iterations):
@@ -253,7 +254,7 @@ class NonlinearMPC(WinchMPC):
         """Return the drive command that gives a move [N m]."""
         winch, drift, of = self.model.winch, self.stage.drift, self.model.constants_at.start
         over = drift(chi[: winch.size], torque, ends, chi[of : of + 2])
-        self._cut = None
+        self._cuts = [_NONE, *self._cuts[:-1]]
         if over == 0.0 or not math.isfinite(over):
             return winch.command(torque, speed)
         window, rest = self.window, winch.rest_torque
@@ -263,7 +264,7 @@ class NonlinearMPC(WinchMPC):
         asked = winch.command(start_torque(torque + rest, over, peak) - rest, speed)
         same = winch.command(torque + over, speed)
         if asked != same:
-            self._cut = (asked, same, 3.0 * abs(over / winch.gain))
+            self._cuts[0] = (asked, same, 3.0 * abs(over / winch.gain))
         return asked
 
     def _power(self) -> FloatArray:
@@ -283,11 +284,15 @@ class NonlinearMPC(WinchMPC):
         """Return the command that, never cut, has the torque's mean of the last sample.
 
         A drive that cut the torque for a part of the sample says what it applies at the end of it.
-        NaN where it cut nothing, or says something else: a brake, another hand on the drive.
+        NaN where it cut nothing, or says something else: a brake, another hand on the drive.  Of
+        late commands it is said of the newest, as the drive says what it has cut.
         """
-        if self._cut is None:
-            return math.nan
-        asked, same, reach = self._cut
+        asked, same, reach = self._cuts[-1]
+        if self.model.winch.waiting:
+            other, meant, far = self._cuts[-2 if self._share < 1.0 else -1]
+            more = self._share * (same - asked) + (1.0 - self._share) * (meant - other)
+            asked, reach = self.estimator.given, max(reach, far)
+            same = asked + more
         return same if abs(applied - asked) <= reach else math.nan
 
     def _prepare(self, *, exact: bool = False) -> None:

@@ -64,10 +64,10 @@ def forced_response(p: Condensed, stage: Stage, scale: FloatArray) -> tuple[Floa
         for k in range(j):
             G[here, k * size : (k + 1) * size] = of_y[j - 1 - k]
     kinds = {"speed": winch.speed, "tension": winch.tension, "payload": winch.payload}
-    kinds["command"] = winch.back * winch.speed + stage.drift.state / winch.gain
+    kinds["command"] = winch.back * winch.reckoned + stage.drift.state / winch.gain
     wanted = [(winch.payload, j) for j in range(1, N)]
     wanted += [(row, N) for row in np.eye(n)]
-    wanted += [(winch.speed, j) for j in p.horizon.starts]
+    wanted += [(winch.reckoned, j) for j in p.horizon.starts]
     for kind, j, factor in zip(p.kind, p.at, scale, strict=True):
         wanted.append((factor * kinds[WATCHED[kind]], int(j)))
     Theta = np.zeros((len(wanted), N * size))

@@ -34,7 +34,7 @@ from models.basics import FloatArray, InputError, ReadOnlyArrays
 from models.plant import DrumTravel, build_plant, hermite_hold, zero_order_hold
 from models.simulation import Kernel
 
-from ..winch import SampledWinch
+from ..winch import SampledWinch, by_command
 from .mean_torque import Drift, mean_torque
 
 _OWNER = "nonlinear predictive control"
@@ -115,7 +115,7 @@ def make_stage(
 
 def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift) -> dict[str, FloatArray]:
     """Return the matrices of one sample."""
-    plant, T, n = winch.plant, winch.sample_time, winch.size
+    plant, T, n = winch.plant, winch.sample_time, len(winch.plant.states)
     known = {name: k for k, name in enumerate(plant.disturbances)}
     columns = np.column_stack([np.zeros((n, 0)), *law.columns.values()])
     rows = np.vstack([np.zeros((0, n)), *(a.row for a in law.arguments.values())])
@@ -126,11 +126,16 @@ def _sampled(winch: SampledWinch, law: ForceLaw, drift: Drift) -> dict[str, Floa
     moved, hook = hermite_hold(plant.A, motion, T, 0.5 * T)
     # The command is held at u = back omega(start) + d / gain, with d what gives the input: the mean
     # torque, and what the start is over it.
-    D = rows @ added[:, 0] / winch.gain
+    late = winch.data.command_delay / T
+    commands = by_command(plant, added[:, 0], 0.5 * T, T, late)
+    state = np.hstack([over, commands[:, 1:]])
+    D = rows @ commands[:, 0] / winch.gain
     constants = np.column_stack([added[:, 1], added[:, 0] / winch.gain])
     return {
-        "from_forces": zero_order_hold(plant.A, held, T)[1][:, 2:],
-        "C": rows @ (over + winch.back * np.outer(added[:, 0], winch.speed))
+        "from_forces": np.pad(
+            zero_order_hold(plant.A, held, T)[1][:, 2:], [(0, winch.waiting), (0, 0)]
+        ),
+        "C": rows @ (state + winch.back * np.outer(commands[:, 0], winch.reckoned))
         + np.outer(D, drift.state),
         "D": D * (1.0 + drift.mean),
         "C_hook": rows @ moved + felt @ hook + np.outer(D, drift.hook),
@@ -190,8 +195,7 @@ def force_law(
             if name.startswith("spring."):
                 arguments[name] = rope.tension(int(name.removeprefix("spring.")))
             else:
-                rows = {_VELOCITY: winch.velocity, _SPEED: winch.speed, _ANGLE: rope.unit(_ANGLE)}
-                arguments[name] = Argument(row=rows[name], hook=still)
+                arguments[name] = Argument(row=rope.unit(name), hook=still)
         return symbols[name]
 
     def smooth(k: int, tension: ca.SX) -> ca.SX:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .planning import plan_model
     from .prediction import PredictionModel, ProcessNoise, prediction_model, with_noise
     from .regulation import feedback_row, regulator
-    from .sampled import SampledWinch, command_law, sampled_winch
+    from .sampled import SampledWinch, by_command, command_law, sampled_winch
     from .weights import Weights, tune_weights
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -24,7 +24,7 @@ from models.sensing import HEARD, MEASURED, Measurement
 
 from ..programme import ChangingGains, corrected, kalman_gain, prediction_covariance
 from .gate import SignalGate
-from .prediction import PredictionModel, constant_scales
+from .prediction import PredictionModel, ages, constant_scales
 
 _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
@@ -58,8 +58,9 @@ class WinchEstimator:
         self._A = np.ascontiguousarray(model.A)
         self._B = np.ascontiguousarray(model.B[:, 0])
         # Telemetry that is later or earlier than usual is compared with what was on its way then.
-        delays = dict(zip(MEASURED, model.winch.plant.delays, strict=True))
-        self._usual = delays[MEASUREMENTS[0]]
+        delays = ages(model.winch)
+        self._usual = model.winch.data.delay
+        self._own = {name: delays[name] - self._usual for name in MEASUREMENTS}
         self._slack = _LATER * model.winch.sample_time
         # All is counted from rest, where the rope already carries the load.
         self._rest = np.zeros(len(MEASURED))
@@ -77,15 +78,18 @@ class WinchEstimator:
                 self._sent[model.first[name]] = now
             self._felt[k] = now * max(0.0, 1.0 - delays[name] / model.winch.sample_time)
         self._speed = np.zeros(model.size)
-        self._speed[: model.winch.size] = model.winch.speed
+        self._speed[: model.winch.size] = model.winch.reckoned
         self.gate = SignalGate(model)
+        self._cut = np.zeros(model.size)  # of what the drive cuts from a command that has arrived
+        self._cut[: model.winch.size] = model.winch.from_constants[:, 1] * model.winch.gain
         self.reset()
 
     def reset(self) -> None:
         """Forget everything: the load hangs at rest in still water."""
         self.state = np.zeros(self.model.size)
         self._ahead = np.zeros(self.model.size)
-        self.speed = 0.0
+        self.speed = 0.0  # the reckoned one
+        self.given = math.nan  # the last command, of a controller whose commands are late
         self._drag = 0.0  # force of quadratic drag at the sample before [N]
         self._begun = False
         self._samples = 0
@@ -121,8 +125,11 @@ class WinchEstimator:
         if self._begun:
             if not math.isfinite(applied):
                 applied = float(shown[_APPLIED])
-            if math.isfinite(applied):  # what is not known is taken as having held the load
-                ahead = ahead + self._B * winch.torque(applied, self.speed)
+            given = applied if math.isnan(self.given) else self.given
+            if math.isfinite(given):  # what is not known is taken as having held the load
+                ahead = ahead + self._B * winch.torque(given, self.speed)
+            if given != applied and math.isfinite(applied):
+                ahead = ahead + self._cut * (applied - given)
             # Quadratic drag at the mean of the velocities before and after: no linear model has it.
             before, after = self._drag, winch.extra_drag(float(self._velocity @ ahead))
             ahead = ahead + self._force * (0.5 * (before + after)) + self._sent * before
@@ -169,7 +176,7 @@ class WinchEstimator:
             return self._C
         rows = self._C.copy()
         for name in MEASUREMENTS:
-            rows[MEASURED.index(name)] = self.model.late_row(name, age)
+            rows[MEASURED.index(name)] = self.model.late_row(name, age + self._own[name])
         return rows
 
 

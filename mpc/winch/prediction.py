@@ -16,7 +16,8 @@ The state chi holds, in this order,
   the accelerometer and of the tension.  Without them a load of another weight would be held off
   its place.  (Where the payload's zero is, a heavier load has stretched the rope by more: seen from
   there it is the tension that is off);
-* what telemetry and reference unit have on their way: earlier values of what they show.
+* what telemetry and reference unit have on their way: earlier values of what they show.  A reading
+  that is held is as old as it is in the mean, and what its age is off by is error.
 
 `mpc.winch.estimator` makes a Kalman filter of it, `mpc.linear.winch_programme` the quadratic
 programme.
@@ -173,7 +174,8 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     sea_A, sea_Q = noisy_hold(sea.A, sea.B, T)
     error_A, error_root, error_C = _unit_error(case, hook, T, (sea_A, sea_Q, sea))
     errors = error_C.shape[1]
-    depth = _depths(case, T)
+    delays = ages(winch)
+    depth = _depths(case, T, delays)
     sea_at = slice(n, n + sea.order)
     error_at = slice(sea_at.stop, sea_at.stop + errors)
     constants_at = slice(error_at.stop, error_at.stop + len(CONSTANTS))
@@ -204,12 +206,11 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
 
     hook_rows = np.zeros((2, end))
     hook_rows[:, sea_at] = shown
-    delays = dict(zip(MEASURED, winch.plant.delays, strict=True))
     late = [
         _late_row(now[k], first[name], depth[name], delays[name] / T) for k, name in enumerate(LATE)
     ]
     other = np.zeros((len(MEASURED) - len(LATE), end))
-    other[:, :n] = winch.plant.C[len(LATE) :]
+    other[:, : n - winch.waiting] = winch.plant.C[len(LATE) :]
     other[:, sea_at] = winch.plant.F[len(LATE) :, :2] @ shown
     other[-1, constants_at.start + 3] = 1.0
     sea_root = root_of(sea_Q)
@@ -295,6 +296,13 @@ def _variances(model: PredictionModel, share: float) -> FloatArray:
         own = name.removeprefix("payload.")
         step = float(getattr(sensors.payload, f"{own}_resolution"))
         rms[name] = math.hypot(rms[name], sensors.noise_rms(own), step / math.sqrt(12.0))
+    # What is held tells once what it shows at several samples, and is older or younger than in the
+    # mean by up to half of them: off by as much as a load that moves like the hook, at the most.
+    changes = (acceleration**2 / rate, acceleration, rate)
+    for name, change, hold in zip(MEASUREMENTS, changes, model.winch.plant.holds, strict=False):
+        if (samples := hold / T) > 1.0:
+            off = change * T * math.sqrt((samples**2 - 1.0) / 12.0)
+            rms[name] = math.hypot(math.sqrt(samples) * rms[name], off)
     unit = MruModel(case.sensors.mru, T, heave, seed=0)
     for process in (p for p in unit.processes if p.white):
         over, _ = low_pass_noise(process.corner, T)
@@ -365,12 +373,25 @@ def _slow_error(hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
     return low_pass_noise(_SLOW * float(hook.velocity.rms / hook.displacement.rms), T)
 
 
-def _depths(case: Case, T: float) -> dict[str, int]:
+def ages(winch: SampledWinch) -> dict[str, float]:
+    """Return how old each measurement usually is [s]; one that is held, in the mean.
+
+    Of a reading that is taken at a sample there is none within that sample: half of it less than
+    the mean age of a hold in continuous time.
+    """
+    plant, T = winch.plant, winch.sample_time
+    return {
+        name: delay - 0.5 * min(hold, T)
+        for name, delay, hold in zip(MEASURED, plant.delays, plant.holds, strict=True)
+    }
+
+
+def _depths(case: Case, T: float, delays: Mapping[str, float]) -> dict[str, int]:
     """Return how many earlier values are remembered of each late signal."""
-    link = case.sensors.telemetry
-    telemetry = math.ceil((link.delay + link.jitter) / T - 1e-6) + _SPARE
-    unit = 0 if case.sensors.mru is None else math.ceil(case.sensors.mru.delay / T - 1e-6)
-    return {name: telemetry if name in MEASUREMENTS else unit for name in LATE}
+    jitter = case.sensors.telemetry.jitter
+    found = {name: math.ceil(delays[name] / T - 1e-6) for name in LATE}
+    more = {name: math.ceil((delays[name] + jitter) / T - 1e-6) + _SPARE for name in MEASUREMENTS}
+    return found | more
 
 
 def _present(
@@ -378,7 +399,7 @@ def _present(
 ) -> FloatArray:
     """Return the rows of what telemetry and reference unit take in."""
     rows = np.zeros((len(LATE), size))
-    rows[:, : winch.size] = winch.plant.C[: len(LATE)]
+    rows[:, : winch.size - winch.waiting] = winch.plant.C[: len(LATE)]
     rows[:, sea_at] = winch.plant.F[: len(LATE), :2] @ shown
     # A force on the payload is felt by its accelerometer at once.
     rows[: len(MEASUREMENTS), constants_at.start] = winch.force_felt
@@ -410,6 +431,8 @@ def _scales(model: PredictionModel) -> FloatArray:
     for k, name in enumerate(model.winch.plant.states):
         if not model.winch.moved[k].any():
             sizes[k] = by_signal.get(name.rsplit(".", 1)[-1], heave)
+    rest = max(abs(model.winch.rest_command), abs(model.winch.rest_torque / model.winch.gain))
+    sizes[n - model.winch.waiting : n] = 0.1 * rest
     # What one sample adds to an error is next to nothing in a filter's displacement.
     error = slice(w, w + model.errors)
     lasting = solve_discrete_lyapunov(model.A[error, error], (model.G @ model.G.T)[error, error])

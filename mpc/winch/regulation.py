@@ -27,6 +27,7 @@ def regulator(model: PredictionModel, weight: float) -> LQRegulator:
     # In units of the hook's rms and the peak torque, so that the equation is well scaled.
     scale = np.maximum(np.abs(winch.moved).max(axis=1), 1e-9)
     scale[scale == 1e-9] = 1.0
+    scale[winch.size - winch.waiting :] = winch.case.winch.drive.torque_peak / winch.gain
     return lq_regulator(
         np.asarray(winch.A),
         np.asarray(winch.B),

@@ -15,6 +15,11 @@ it does in the drive.
 Everything is a deviation from rest.  The hook moves along the cubic through its displacement and
 velocity at both ends of a sample; the rest is exact.  Constants c are a force on the payload [N]
 and a torque at the motor [N m].
+
+Where commands are late, x holds those on their way, over u_rest, the newest first; the oldest still
+acts over a part of the sample, the next one over the rest.  The speed that a command reckons with
+is then that at which it will arrive, as the motor alone would have it: d is the torque asked for
+there, but for what rope and load do to the speed in the meantime.
 """
 
 from __future__ import annotations
@@ -27,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range, read_only
+from models.basics import FloatArray, ReadOnlyArrays, check_range, read_only
 from models.case import Case
 from models.plant import (
     MEAN_LOSSES,
@@ -37,6 +42,7 @@ from models.plant import (
     PlantData,
     build_plant,
     hermite_hold,
+    late_hold,
     zero_order_hold,
 )
 from models.sensing import sensed_plant
@@ -58,6 +64,7 @@ class SampledWinch(ReadOnlyArrays):
     payload: FloatArray  #: Row of the payload's displacement [m], of the state, (n,).
     velocity: FloatArray  #: Of its velocity [m/s].
     speed: FloatArray  #: Of the motor's speed [rad/s].
+    reckoned: FloatArray  #: Of the speed that a command reckons with [rad/s].
     tension: FloatArray  #: Of the tension at the payload [N].
     tension_from_hook: FloatArray  #: Shares of (z, z') in that tension, (2,).
     tension_from_constants: FloatArray  #: Shares of the constants in it, (2,).
@@ -85,6 +92,11 @@ class SampledWinch(ReadOnlyArrays):
         """Number of states."""
         return len(self.A)
 
+    @property
+    def waiting(self) -> int:
+        """Number of commands on their way, the last of the states."""
+        return self.size - len(self.plant.states)
+
     def extra_drag(self, velocity: float) -> float:
         """Return the force of quadratic drag at a payload velocity [m/s] that A has not [N].
 
@@ -95,11 +107,11 @@ class SampledWinch(ReadOnlyArrays):
         return (self.drag - self.data.quadratic_drag * abs(velocity)) * velocity
 
     def command(self, torque: float, speed: float) -> float:
-        """Return the drive command for an input d [N m] at a motor speed [rad/s]."""
+        """Return the drive command for an input d [N m] at a reckoned speed [rad/s]."""
         return self.rest_command + self.back * speed + torque / self.gain
 
     def torque(self, command: float, speed: float) -> float:
-        """Return the input d [N m] of a drive command at a motor speed [rad/s]."""
+        """Return the input d [N m] of a drive command at a reckoned speed [rad/s]."""
         return (command - self.rest_command - self.back * speed) * self.gain
 
     def off(self, **factors: float) -> SampledWinch:
@@ -164,19 +176,19 @@ def sampled_winch(
     Raises
     ------
     InputError
-        If a number is out of its range, or commands or readings are late in a way that the
-        prediction does not hold.
+        If a number is out of its range.
     """
     T = check_range(_OWNER, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
     coefficient = (case.payload.fixed_drag or 0.0) if drag is None else drag
-    _refuse(case)
     data = PlantData.from_case(case).viscous
     count = data.chosen_masses(masses)
     changed: dict[str, Any] = {k: v * getattr(data, k) for k, v in (off or {}).items()}
     data = replace(data, **changed)
-    plant = sensed_plant(data, masses=count, drag=coefficient, sensors=case.sensors)
+    # Late commands are on their way in the state, and so in no measurement's delay.
+    on_time = replace(data, command_delay=0.0)
+    plant = sensed_plant(on_time, masses=count, drag=coefficient, sensors=case.sensors)
     symbolic = build_plant(data, count)
-    rest = symbolic.operating_point(MEAN_LOSSES)
+    rest, moved = symbolic.operating_point(MEAN_LOSSES), _moved(plant, symbolic)
     gain, back = command_law(symbolic)
     known = {name: k for k, name in enumerate(plant.disturbances)}
     hook = [known["hook.heave"], known["hook.heave_rate"]]
@@ -185,6 +197,19 @@ def sampled_winch(
     # Command and constant forces are held over a sample, which is exact; the hook is not.
     held = np.column_stack([plant.B[:, 0], plant.E[:, known["payload.force"]]])
     A, inputs = zero_order_hold(plant.A, held, T)
+    late = data.command_delay / T
+    n, waiting = len(A), late_hold(late)[0]
+    commands = by_command(plant, inputs[:, 0], T, T, late)
+    own = np.zeros((n + waiting, n + waiting))
+    own[:n, :n], own[:n, n:] = A, commands[:, 1:]
+    own[n + 1 :, n:-1] = np.eye(max(waiting - 1, 0))
+    given = np.concatenate([commands[:, 0], np.eye(waiting)[0] if waiting else ()])
+    reckoned = _reckoned(plant, speed, T, late)
+
+    def wide(part: FloatArray) -> FloatArray:
+        """Return rows of the plant's state, or columns of its effect, with commands as well."""
+        return np.pad(part, [(0, waiting), *[(0, 0)] * (part.ndim - 1)])
+
     # A rope goes slack first at its lower end, which does not carry its weight.
     tension, force = rows["rope.lower_tension"], known["payload.force"]
     return SampledWinch(
@@ -192,18 +217,19 @@ def sampled_winch(
         data=data,
         plant=plant,
         # The command is held at u = back omega(start) + d / gain.
-        A=A + back * np.outer(inputs[:, 0], speed),
-        B=inputs[:, :1] / gain,
-        from_hook=hermite_hold(plant.A, plant.E[:, hook], T, T)[0],
-        from_constants=np.column_stack([inputs[:, 1], inputs[:, 0] / gain]),
-        payload=plant.Cz[rows["payload.displacement"]],
-        velocity=plant.Cz[rows["payload.velocity"]],
-        speed=speed,
-        tension=plant.Cz[tension],
+        A=own + back * np.outer(given, reckoned),
+        B=given[:, None] / gain,
+        from_hook=wide(hermite_hold(plant.A, plant.E[:, hook], T, T)[0]),
+        from_constants=wide(np.column_stack([inputs[:, 1], inputs[:, 0] / gain])),
+        payload=wide(plant.Cz[rows["payload.displacement"]]),
+        velocity=wide(plant.Cz[rows["payload.velocity"]]),
+        speed=wide(speed),
+        reckoned=reckoned,
+        tension=wide(plant.Cz[tension]),
         tension_from_hook=plant.Fz[tension, hook],
         tension_from_constants=np.array([plant.Fz[tension, force], 0.0]),
         force_felt=plant.F[: len(MEASUREMENTS), force],
-        moved=_moved(plant, symbolic),
+        moved=np.vstack([moved, np.outer(np.full(waiting, back), speed @ moved)]),
         gain=gain,
         back=back,
         rest_command=rest.command,
@@ -213,6 +239,42 @@ def sampled_winch(
         masses=symbolic.masses,
         drag=coefficient,
     )
+
+
+def by_command(
+    plant: LinearPlant, held: FloatArray, t: float, sample_time: float, late: float
+) -> FloatArray:
+    """Return what a command does up to a time t [s] of a sample, the newest first, (n, 1 + m).
+
+    Of a command that is held all the time it is (n,); m of them are on their way, each late by so
+    many samples: the last of them acts first, the one before it next.
+    """
+    waiting, share = late_hold(late)
+    columns = np.zeros((len(held), waiting + 1))
+    columns[:, waiting] = held
+    rest = t - share * sample_time
+    if waiting and rest > 0.0:
+        columns[:, waiting - 1] = zero_order_hold(plant.A, plant.B[:, :1], rest)[1][:, 0]
+        columns[:, waiting] -= columns[:, waiting - 1]
+    return columns
+
+
+def _reckoned(plant: LinearPlant, speed: FloatArray, T: float, late: float) -> FloatArray:
+    """Return the row of the motor's speed at which a command arrives, by the motor alone, (n + m).
+
+    The hook moves on meanwhile, of which the state does not tell; and so a rope that is held at its
+    top would tell less than no rope.
+    """
+    waiting, share = late_hold(late)
+    names = plant.states
+    own = [k for k, name in enumerate(names) if name.startswith("motor.") and "angle" not in name]
+    rows = np.eye(len(speed) + waiting)[own]
+    for k in range(waiting):  # the oldest first, which acts to its end
+        A, B = plant.A[np.ix_(own, own)], plant.B[own, :1]
+        over, held = zero_order_hold(A, B, (1.0 if k else share) * T)
+        rows = over @ rows
+        rows[:, len(rows[0]) - 1 - k] += held[:, 0]
+    return np.asarray(speed[own] @ rows)
 
 
 def command_law(plant: Plant) -> tuple[float, float]:
@@ -240,18 +302,3 @@ def _moved(plant: LinearPlant, symbolic: Plant) -> FloatArray:
         by |= {"displacement": (1.0, 0.0), "velocity": (0.0, 1.0)}
         moved[k] = by.get(signal, (0.0, 0.0))
     return moved
-
-
-def _refuse(case: Case) -> None:
-    """Refuse what the prediction does not hold: late commands, held or later readings."""
-    payload = case.sensors.payload
-    late = {"winch.drive.command_delay": case.winch.drive.command_delay}
-    for name in ("acceleration", "velocity", "displacement"):
-        late[f"sensors.payload.{name}_rate"] = payload.rate(name) or 0.0
-        late[f"sensors.payload.{name}_latency"] = payload.latency(name)
-    for path, value in late.items():
-        if value > 0.0:
-            raise InputError(
-                f"{case.label}: {path} must be left out for predictive control, whose prediction "
-                f"does not hold it, got {value:g}"
-            )

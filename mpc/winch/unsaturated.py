@@ -65,7 +65,7 @@ class Unsaturated:
         row, kept = share * self._feedback, self._kept
         ahead = model.A - model.B @ row[None, :]
         command = -row / winch.gain
-        command[: winch.size] += winch.back * winch.speed
+        command[: winch.size] += winch.back * winch.reckoned
         return ahead @ kept, ahead @ self.gain, (command @ kept)[None, :], command[None] @ self.gain
 
     def poles(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> ComplexArray:
@@ -131,7 +131,7 @@ class Unsaturated:
         winch = truth.winch
         # The true input d follows from the command and the true speed.
         to_input = np.zeros(truth.size)
-        to_input[: winch.size] = -winch.back * winch.gain * winch.speed
+        to_input[: winch.size] = -winch.back * winch.gain * winch.reckoned
         into = B * winch.gain
         own = A + B @ to_input[None, :]
         closed = np.block([[own + into @ Dc @ C, into @ Cc], [Bc @ C, Ac]])
@@ -160,7 +160,7 @@ def _plant(model: PredictionModel) -> tuple[FloatArray, FloatArray, FloatArray]:
     winch = model.winch
     A = np.array(model.A)
     A[: winch.size, : winch.size] -= (
-        winch.back * winch.gain * np.outer(model.B[: winch.size, 0], winch.speed)
+        winch.back * winch.gain * np.outer(model.B[: winch.size, 0], winch.reckoned)
     )
     kept = _reached(model)
     return A[np.ix_(kept, kept)], model.B[kept] * winch.gain, model.C[:, kept]

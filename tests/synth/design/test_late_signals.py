@@ -1,4 +1,4 @@
-"""Late commands and held readings in designs: margins, verification, sweeps, refusals."""
+"""Late commands and held readings in designs: margins, verification, sweeps."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from former_cases import load_case
 
-from models import InputError
 from models.basics import PhysicsWarning
 from models.spread import Spread, Uniform
-from mpc.winch import sampled_winch
 from synth import evaluate_gains
 from synth.question import pose
 from synth.sweeps import FrequencyEngine
@@ -70,9 +68,3 @@ def test_a_gauge_that_feels_the_waves_is_told_of() -> None:
         warnings.simplefilter("error")
         pose(case.replace({"rope.length": half + 1.0}))
         pose(case.replace({"rope.length": half - 1.0}), "feed-forward")
-
-
-@pytest.mark.parametrize("path", [*READ])
-def test_predictive_control_refuses_what_it_does_not_hold(path: str) -> None:
-    with pytest.raises(InputError, match=f"{path} must be left out for predictive control"):
-        sampled_winch(load_case("subsea-crane").replace({path: READ[path]}))
