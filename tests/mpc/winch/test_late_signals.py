@@ -11,12 +11,19 @@ from mpc_cases import WEIGHTS, case_of
 
 from models import Case
 from models.operation import Scenario
-from models.plant import MEASUREMENTS
+from models.plant import MEASUREMENTS, zero_order_hold
 from models.sensing import HEARD, MEASURED, Measurement, SensorModel
 from models.simulation import SimulationOptions, prepare, run_simulation
 from mpc.linear import LinearMPC
 from mpc.nonlinear import NonlinearMPC
-from mpc.winch import ProcessNoise, prediction_model, regulator, sampled_winch, with_noise
+from mpc.winch import (
+    ProcessNoise,
+    WinchEstimator,
+    prediction_model,
+    regulator,
+    sampled_winch,
+    with_noise,
+)
 from mpc.winch.prediction import ages
 from mpc.winch.regulation import feedback_row
 from mpc.winch.unsaturated import Unsaturated
@@ -185,6 +192,33 @@ def test_a_held_reading_is_as_old_as_it_is_in_the_mean() -> None:
     noise = SensorModel.from_case(case, T).noise_rms("velocity")
     held = model.R[MEASURED.index("payload.velocity")]
     assert held == pytest.approx(4.0 * noise**2 + spread, rel=1e-3)
+
+
+def test_what_a_drive_cuts_it_cuts_now_of_a_command_given_before() -> None:
+    winch = sampled_winch(late_case("thesis-1975", 0.07), sample_time=T)
+    estimator = WinchEstimator(prediction_model(winch))
+    shown = np.full(len(HEARD), math.nan)
+    given, cut, n = winch.rest_command + 3.0, 2.0, len(winch.plant.states)
+    estimator.update(Measurement(shown))
+    estimator.given = given
+    shown[HEARD.index("drive.applied")] = given - cut
+    found = estimator.update(Measurement(shown))
+    # The command has only begun its way; what is missing from those before acts over the sample.
+    missing = zero_order_hold(winch.plant.A, winch.plant.B[:, :1], T)[1][:, 0]
+    np.testing.assert_allclose(found[:n], -cut * missing, rtol=2e-3)  # but for quadratic drag
+    np.testing.assert_allclose(found[n : winch.size], [3.0, 0.0], rtol=1e-9)
+
+
+def test_a_torque_that_was_cut_for_a_part_of_the_sample_is_that_of_late_commands() -> None:
+    controller = NonlinearMPC(
+        late_case("thesis-1975", 0.03), weights=WEIGHTS["thesis-1975"], compiled=False
+    )
+    controller.estimator.given = 5.0
+    # (asked, what would do as much uncut, how far the drive may say to be off), the newest first:
+    # of 0.6 of the sample the one before, of the rest the newest.
+    controller._cuts = [(7.0, 6.5, 1.0), (10.0, 8.0, 0.5)]
+    assert controller._uncut(5.8) == pytest.approx(5.0 - 0.6 * 2.0 - 0.4 * 0.5)
+    assert math.isnan(controller._uncut(6.1))
 
 
 class Restless:
