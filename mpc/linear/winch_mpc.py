@@ -185,6 +185,7 @@ class WinchMPC(ABC):
                 f"{fallback.sample_time:g} s"
             )
         self._of = np.repeat(np.arange(len(blocks)), self._blocks)  # block of each sample
+        self._stale = min(round(_STALE / T), len(self._of))
         self._fallback, self._unlimited = fallback, feedback_row(self.regulator, self.model)
         self._deadline = math.inf if deadline is None else deadline
         self._prove = prove
@@ -312,7 +313,7 @@ class WinchMPC(ABC):
             self._counts["late"] += 1
             return None
         self.solved = solved
-        soon = solved.multipliers[: self._of[round(_STALE / self.sample_time)]]
+        soon = solved.multipliers[: self._of[self._stale - 1] + 1]
         self._plan, self._age = solved.v if soon.any() else None, 0
         return float(solved.v[0])
 
@@ -332,7 +333,7 @@ class WinchMPC(ABC):
         """
         winch = self.model.winch
         self._age += 1
-        if self._plan is not None and self._age * self.sample_time < _STALE:
+        if self._plan is not None and self._age < self._stale:
             return float(self._plan[self._of[self._age]])
         asked = self._unlimited[: winch.size] @ winch.moved @ reference
         return float(asked - self._unlimited @ chi) / self.programme.unit

@@ -137,6 +137,7 @@ class WinchEstimator:
         # Age and validity of the telemetry come with it: old values are used as such, and a flag
         # that says "not valid" takes a signal out before its number is looked at.
         age, reading = float(shown[_AGE]), shown[_AT]
+        age = age if math.isfinite(age) else self._usual
         expected = self._late(age) @ ahead + self._rest
         error = reading - expected
         error -= self._felt * winch.extra_drag(float(self._velocity @ ahead))
@@ -171,8 +172,8 @@ class WinchEstimator:
         self._ahead = ahead
 
     def _late(self, age: float) -> FloatArray:
-        """Return C for telemetry of an age [s]; the usual one where it is not known."""
-        if not math.isfinite(age) or abs(age - self._usual) <= self._slack:
+        """Return C for telemetry of an age [s]."""
+        if abs(age - self._usual) <= self._slack:
             return self._C
         rows = self._C.copy()
         for name in MEASUREMENTS:

@@ -63,7 +63,7 @@ class SignalGate:
     def __init__(self, model: PredictionModel) -> None:
         winch, T = model.winch, model.winch.sample_time
         self._T = T
-        shift = winch.plant.C[:, : winch.size] @ winch.moved
+        shift = winch.plant.C @ winch.moved[: len(winch.plant.A)]
         turning = np.array([shift[_HAUL, 0], shift[_TURNING, 1]])
         self._per_drum = 1.0 / turning  # the payload's on a rigid rope, per haul and motor speed
         self._per_rate = np.array([1.0, turning[0] / turning[1], 1.0, 1.0])  # value per rate and s
@@ -76,6 +76,8 @@ class SignalGate:
         jerk = acceleration**2 / way
         third = jerk * T**3 / 12.0
         self._bent = np.array([third, _ROUGH * way * T, _ROUGH * acceleration * T, third])
+        # A reading that is taken now and then is shown again until the next.
+        self._held = np.ceil(np.array(winch.plant.holds) / T - 1e-6).clip(1.0) - 1.0
         self._row = min(_ROW, math.ceil(_LONGEST / T))
         self.reset()
 
@@ -186,11 +188,11 @@ class SignalGate:
         self._same += again
         self._same[moved] = 0
         travel = (self._edges[1] - self._edges[0]).max(axis=0)
-        still = self._same > 0
+        still = self._same > self._held
         standing = still & (self._stuck | (travel > _MOVED * np.sqrt(variance)))
         # What shows it of one signal shows it of all that come from the same device.
         standing = still & np.logical_or.reduceat(standing, _DEVICES)[_DEVICE]
-        self._stuck = standing & (self._same >= _UPDATES)
+        self._stuck = standing & (self._same >= _UPDATES * (self._held + 1))
         return standing
 
     def _should(self, reading: FloatArray, expected: FloatArray) -> FloatArray:

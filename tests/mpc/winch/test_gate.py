@@ -34,7 +34,7 @@ class Calm:
 
     def __init__(self, model, seed=1):
         self.gate, self._rng, self._k = SignalGate(model), np.random.default_rng(seed), 0
-        shift = model.winch.plant.C[:, : model.winch.size] @ model.winch.moved
+        shift = model.winch.plant.C @ model.winch.moved[: len(model.winch.plant.A)]
         self._turns = shift[SIGNAL["motor.speed"], 1] / shift[SIGNAL["drum.haul"], 0]
         self._error = 0.3 * np.sqrt(model.R)  # a robust filter trusts its sensors less
         self._spread = 4.0 * model.R
@@ -165,6 +165,22 @@ def test_a_telegram_that_comes_now_and_then_is_not_stuck(model):
         there[:3] = k % 4 == 0
         found = calm.sample(there=there)
         assert [found[name] for name in MEASURED] == list(there)
+
+
+def test_a_reading_that_is_taken_now_and_then_is_not_stuck_before_the_next():
+    case = case_of("thesis-1975-rope").replace({"sensors.payload.displacement_rate": "5 Hz"})
+    gate = SignalGate(prediction_model(sampled_winch(case, sample_time=T)))
+    every = np.ones(len(MEASURED), dtype=np.bool_)
+    at, small = SIGNAL["payload.displacement"], np.full(len(MEASURED), 1e-6)
+    rng, believed = np.random.default_rng(2), []
+    for k in range(1200):
+        expected = 1e-4 * rng.normal(size=len(MEASURED))
+        expected[at] = 0.1 * k * T
+        reading = expected.copy()
+        reading[at] = 0.1 * (k - k % 4 if k < 1000 else 1000) * T
+        believed.append(gate.passes(reading, expected, reading - expected, small, every)[at])
+    assert all(believed[500:1000])
+    assert not any(believed[1010:])
 
 
 def test_a_load_at_rest_is_not_stuck(model):
