@@ -37,7 +37,15 @@ if TYPE_CHECKING:
         write_text_atomically,
     )
     from .hdf5_check import check_hdf5
-    from .intervals import FallTime, Interval, Share, fall_time, mean_interval, share
+    from .intervals import (
+        FallTime,
+        Interval,
+        Share,
+        fall_time,
+        mean_interval,
+        pooled_interval,
+        share,
+    )
     from .metrics import (
         THREE_HOURS,
         SpectrumStatistics,

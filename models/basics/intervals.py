@@ -8,7 +8,7 @@ their seed.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -95,6 +95,55 @@ def mean_interval(
         high=mean + half,
         standard_deviation=deviation,
         count=n,
+        unit=unit,
+    )
+
+
+def pooled_interval(
+    values: npt.ArrayLike,
+    over: npt.ArrayLike | None = None,
+    *,
+    unit: str = "",
+    confidence: float = 0.95,
+) -> Interval:
+    """Return the pooled rms of independent runs, or its ratio to others', with its interval.
+
+    Both have a root mean square for each run, (n,), in the same order: pairs, so that what makes a
+    run easy for both leaves the ratio alone.  Student's interval is that of the logarithm, whose
+    error is half that of the mean squares, each over its mean (the delta method): its ends are
+    positive, and those of the inverse ratio are inverse.  Runs with a NaN are left out; without a
+    finite answer above zero all are NaN.
+
+    Examples
+    --------
+    >>> found = pooled_interval([9.0, 10.0, 11.0])
+    >>> print(f"{found.mean:.3f} ({found.low:.3f} to {found.high:.3f})")
+    10.033 (7.837 to 12.844)
+    >>> found = pooled_interval([9.0, 10.0, 11.0], [4.5, 5.0, 5.5])
+    >>> print(f"{found.mean:g} ({found.low:g} to {found.high:g})")
+    2 (2 to 2)
+    """
+    x = np.asarray(values, dtype=np.float64)
+    y = np.ones_like(x) if over is None else np.asarray(over, dtype=np.float64)
+    known = ~(np.isnan(x) | np.isnan(y))
+    # In units of the largest, so that squares neither overflow nor vanish.
+    sizes = [float(np.abs(z[known]).max(initial=0.0)) for z in (x, y)]
+    if not all(0.0 < size < math.inf for size in sizes):
+        # Without end where runs are, beside others that have one.
+        endless = known.any() and sizes[0] == math.inf and 0.0 < sizes[1] < math.inf
+        centre = math.inf if endless else math.nan
+        return replace(mean_interval([]), mean=centre, count=int(known.sum()), unit=unit)
+    squares = [(z[known] / size) ** 2 for z, size in zip((x, y), sizes, strict=True)]
+    means = [float(square.mean()) for square in squares]
+    spread = mean_interval(squares[0] / means[0] - squares[1] / means[1], confidence=confidence)
+    centre = sizes[0] / sizes[1] * math.sqrt(means[0] / means[1])
+    far = math.exp(0.25 * (spread.high - spread.low))
+    return Interval(
+        mean=centre,
+        low=centre / far,
+        high=centre * far,
+        standard_deviation=0.5 * spread.standard_deviation * centre,
+        count=spread.count,
         unit=unit,
     )
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .clipped import ClippedMPC
     from .linear import LinearMPC
     from .products import Products
     from .winch_mpc import WinchMPC, WinchOptions

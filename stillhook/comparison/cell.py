@@ -244,7 +244,19 @@ class Floor:
     def run(self, seed: int, progress: Progress | None = None) -> Cell:
         """Return the floor of one seed."""
         del progress
-        found, time, payload = self._found(seed)
+        sea = CommonSea(hook=self._hook, lasting=self._question.duration, ease=EASE)
+        motion = sea.motion(self._question.duration, _SAMPLE, seed)
+        from mpc.floor import clairvoyant
+
+        found = clairvoyant(
+            self._case,
+            motion,
+            sample_time=_SAMPLE,
+            settle=self._question.settle,
+            masses=self._question.masses,
+        )
+        time = np.asarray(found.time, dtype=np.float64)
+        payload = np.asarray(found.payload, dtype=np.float64)
         counted = payload[time >= self._question.settle - 1e-9]
         quantities = {
             "tracking error rms": float(np.sqrt(np.mean(counted**2))),
@@ -261,31 +273,6 @@ class Floor:
             quantities=quantities,
             worst=float(time[int(np.argmax(np.abs(payload)))]),
         )
-
-    def trace(self, seed: int, moment: float, progress: Progress | None = None) -> Trace:
-        """Return the payload's motion around a moment [s]."""
-        del progress
-        _, time, payload = self._found(seed)
-        near = np.abs(time - moment) <= 0.5 * WINDOW
-        signals = {"payload.displacement": payload[near]}
-        return Trace(contender=self._name, time=time[near], signals=signals)
-
-    def _found(self, seed: int) -> tuple[Any, FloatArray, FloatArray]:
-        """Return the answer, its times (n,) [s], and the payload's displacement (n,) [m]."""
-        sea = CommonSea(hook=self._hook, lasting=self._question.duration, ease=EASE)
-        motion = sea.motion(self._question.duration, _SAMPLE, seed)
-        from mpc.floor import clairvoyant
-
-        found = clairvoyant(
-            self._case,
-            motion,
-            sample_time=_SAMPLE,
-            settle=self._question.settle,
-            masses=self._question.masses,
-        )
-        time = np.asarray(found.time, dtype=np.float64)
-        payload = np.asarray(found.payload, dtype=np.float64)
-        return found, time, payload
 
 
 def _broken(run: Run, settle: float) -> dict[str, float]:

@@ -2,10 +2,10 @@
 
     cells --> Comparison --> table, worst_moment --> sentences, figures, report, folder
 
-A row of the table is one contender in seas of one height.  Means are over seeds, with Student's
-95 % interval; the pooled root mean square is that of all seeds together, and what is compared
-with the floor.  The payload's rms is about its place, so that a load that has sunk does not count
-as still.
+A row of the table is one contender in seas of one height.  An rms is the pooled one, of all seeds
+together, and a ratio of two is that on the seeds that both have; their 95 % intervals are on a
+log scale, so that they are never negative (`models.basics.pooled_interval`).  The payload's rms is
+about its place, so that a load that has sunk does not count as still.
 """
 
 import math
@@ -17,20 +17,26 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import Interval, mean_interval
+from models.basics import Interval, pooled_interval
 from models.case import Case
 
 from ..controllers import Contender, StoredDesign
 from .cell import Cell, ComparisonQuestion, Trace
 
 COLUMNS: Mapping[str, str] = {
-    "payload rms": "m",
+    "payload rms": "m, pooled over seeds",
     "payload rms low": "m",
     "payload rms high": "m",
-    "pooled rms": "m",
     "residual": "% of the hook's motion, both pooled over seeds",
+    "residual low": "%",
+    "residual high": "%",
     "residual held": "% of the payload's with the drum held, where `none` takes part",
-    "of the floor": "mean square over that of the floor, both pooled over seeds",
+    "over the best": "payload rms over that of the best, on the seeds of both",
+    "over the best low": "",
+    "over the best high": "",
+    "over the floor": "payload rms over that of the floor, on the seeds of both",
+    "over the floor low": "",
+    "over the floor high": "",
     "worst seed": "",
     "worst seed rms": "m",
     "significant": "m",
@@ -56,6 +62,12 @@ COLUMNS: Mapping[str, str] = {
     "step max": "s",
 }
 """Columns of the table after contender, height and runs, with unit or meaning."""
+
+CAUSAL = ("brake", "linear", "filter", "predictive", "own")
+"""Groups of contenders that know what can be known."""
+
+NOTHING = 1e-3
+"""A floor below so much of the stillest contender's rms says nothing."""
 
 _RUNS = {"overspeed trips": "overspeed", "rope-out trips": "rope-out"}
 _BROKEN = {
@@ -111,15 +123,31 @@ class Comparison:
         return next(each for each in self.contenders if each.name == name)
 
     def rms(self, name: str, height: float) -> Interval:
-        """Return the mean over seeds of the payload's rms about its place, and its interval [m]."""
-        return mean_interval([cell.rms for cell in self.of(name, height)], unit="m")
+        """Return the payload's pooled rms about its place, and its interval [m]."""
+        return pooled_interval([cell.rms for cell in self.of(name, height)], unit="m")
 
-    def pooled(self, name: str, height: float, seeds: Sequence[int] | None = None) -> float:
-        """Return the root of the mean square over all seeds, or over some [m]; NaN without any."""
-        wanted = self.seeds if seeds is None else seeds
-        values = [cell.rms for cell in self.of(name, height) if cell.seed in wanted]
-        known = [value for value in values if not math.isnan(value)]
-        return math.sqrt(float(np.mean(np.square(known)))) if known else math.nan
+    def pooled(self, name: str, height: float) -> float:
+        """Return the payload's pooled rms about its place [m]; NaN without a run."""
+        return self.rms(name, height).mean
+
+    def ratio(self, name: str, height: float, other: str | None) -> Interval:
+        """Return the pooled rms over that of another, on the seeds that both have [1]."""
+        return self._over(name, height, {c.seed: c.rms for c in self.of(other or "", height)})
+
+    def residual(self, name: str, height: float) -> Interval:
+        """Return the pooled rms over the hook's, which is the same for all in a sea [1]."""
+        hook = {
+            cell.seed: cell.quantities["hook rms"]
+            for cell in self.cells
+            if cell.height == height and "hook rms" in cell.quantities
+        }
+        return self._over(name, height, hook)
+
+    def _over(self, name: str, height: float, others: Mapping[int, float]) -> Interval:
+        cells = self.of(name, height)
+        return pooled_interval(
+            [c.rms for c in cells], [others.get(c.seed, math.nan) for c in cells]
+        )
 
     def lost(self, name: str, height: float) -> int:
         """Return in how many runs the payload was lost: lock, brake, divergence, failure."""
@@ -133,6 +161,14 @@ class Comparison:
     def floor(self) -> Contender | None:
         """The clairvoyant floor, if it took part."""
         return next((each for each in self.contenders if each.group == "floor"), None)
+
+    def floor_at(self, height: float) -> str | None:
+        """Return the floor by its name; None where it is next to nothing, and says nothing."""
+        best = self.best(height, CAUSAL)
+        if self.floor is None or not self.of(self.floor.name, height):
+            return None
+        left = self.ratio(self.floor.name, height, best).mean
+        return None if left < NOTHING else self.floor.name
 
     def best(self, height: float, groups: Sequence[str]) -> str | None:
         """Return who of some groups has the least pooled rms at a height; None if nobody has."""
@@ -197,18 +233,15 @@ class Comparison:
         row |= {"note": self.note(contender, height)}
         if not cells:
             return row
-        mean = self.rms(name, height)
-        row |= {
-            "payload rms": mean.mean,
-            "payload rms low": mean.low,
-            "payload rms high": mean.high,
-        }
-        row |= {
-            "pooled rms": self.pooled(name, height),
-            "residual": 100.0 * self._of_hook(name, height),
-            "residual held": 100.0 * self._ratio(name, height, "none"),
-            "of the floor": self._ratio(name, height, self.floor.name if self.floor else "") ** 2,
-        }
+        for column, factor, found in (
+            ("payload rms", 1.0, self.rms(name, height)),
+            ("residual", 100.0, self.residual(name, height)),
+            ("over the best", 1.0, self.ratio(name, height, self.best(height, CAUSAL))),
+            ("over the floor", 1.0, self.ratio(name, height, self.floor_at(height))),
+        ):
+            row[column] = factor * found.mean
+            row |= {f"{column} low": factor * found.low, f"{column} high": factor * found.high}
+        row["residual held"] = 100.0 * self.ratio(name, height, "none").mean
         known = [cell for cell in cells if not math.isnan(cell.rms)]
         if known:
             worst = max(known, key=lambda cell: cell.rms)
@@ -233,27 +266,6 @@ class Comparison:
         steps = [cell.step["max"] for cell in cells if cell.step]
         row["step max"] = max(steps, default=math.nan)
         return row
-
-    def _ratio(self, name: str, height: float, other: str) -> float:
-        """Return the pooled rms over that of another, on the seeds that both have."""
-        own = {c.seed for c in self.of(name, height) if not math.isnan(c.rms)}
-        low = {c.seed for c in self.of(other, height) if not math.isnan(c.rms)}
-        both = sorted(own & low)
-        rms = self.pooled(other, height, both)
-        return self.pooled(name, height, both) / rms if rms > 0.0 else math.nan
-
-    def _of_hook(self, name: str, height: float) -> float:
-        """Return the pooled rms over the hook's, which is the same for all in a sea."""
-        hook = {
-            cell.seed: cell.quantities["hook rms"]
-            for cell in self.cells
-            if cell.height == height and "hook rms" in cell.quantities
-        }
-        both = [c.seed for c in self.of(name, height) if not math.isnan(c.rms) and c.seed in hook]
-        if not both:
-            return math.nan
-        moved = math.sqrt(float(np.mean([hook[seed] ** 2 for seed in both])))
-        return self.pooled(name, height, both) / moved if moved > 0.0 else math.nan
 
     def __str__(self) -> str:
         """Return the pooled rms of every contender as a small tree."""

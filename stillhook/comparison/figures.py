@@ -19,7 +19,6 @@ from ..text import (
     DRUM,
     HOOK,
     REFERENCE,
-    Axes,
     Figure,
     count,
     drawn,
@@ -40,6 +39,7 @@ _COLOURS = {
     "none": HOOK,
     "constant-tension": "#cc79a7",
     "feed-forward": "#e69f00",
+    "feed-forward-full": "#f5d08a",
     "thesis": BEFORE,
     "feedback": "#56b4e9",
     "feedback-eager": "#56b4e9",
@@ -48,6 +48,7 @@ _COLOURS = {
     "combined": AFTER,
     "combined-eager": AFTER,
     "combined-no-antiwindup": "#6a9fc9",
+    "mpc-clipped": "#661100",
     "mpc": DRUM,
     "mpc-ar": "#8c6d31",
     "nonlinear-mpc": "#882255",
@@ -59,6 +60,7 @@ _DASHED = (0, (4, 2))
 _DASHES = ("feedback-eager", "combined-eager", "mpc-preview", "feedback-half", "combined-half")
 _MARKS = "osD^vP*X<>hd8p"
 _FLOOR_SHOWN = 0.05  # of the least rms: a floor below that leaves the figure
+_WIDEST = 1e4  # the most that the axis goes above the stillest
 _FINE = 3e3  # an axis that spans less is marked at 2 and 5 too
 _SHOWN = 8  # contenders among the traces
 
@@ -168,12 +170,11 @@ def _lines(found: Comparison, factor: float, unit: str) -> Figure:
         shift = 0.02 * wide * (place / several - 0.5)
         style: Any = {"linestyle": _line(each.name), "marker": mark, "markersize": 4.5}
         axes.plot(np.array(at) + shift, middle, color=colour, label=each.name, **style)
-        for height, value in zip(at, middle, strict=True):
+        for height in at:
             mean = found.rms(each.name, height)
             if math.isfinite(mean.low):
-                low = max(mean.low / factor, 0.3 * value)
-                ends = [height + shift] * 2
-                axes.plot(ends, [low, max(mean.high / factor, value)], color=colour, linewidth=1.0)
+                span = [mean.low / factor, mean.high / factor]
+                axes.plot([height + shift] * 2, span, color=colour, linewidth=1.0)
         edge = found.cliff(each.name)
         if not math.isnan(edge) and edge in at and each.group != "brake":
             fell = True
@@ -181,8 +182,9 @@ def _lines(found: Comparison, factor: float, unit: str) -> Figure:
             axes.plot(*place_of, "x", color=BROKEN, markersize=11, markeredgewidth=2.2, zorder=5)
     if fell:
         axes.plot([], [], "x", color=BROKEN, markeredgewidth=2.2, label="first loses the load")
-    _span(axes, found, factor)
-    logarithmic(axes, "y", _marks_of(axes.get_ylim()))
+    ends = _ends(found)
+    axes.set_ylim(ends[0] / factor, ends[1] / factor)
+    logarithmic(axes, "y", _marks_of(ends))
     axes.set_xticks(found.heights, [f"{h:.4g}" for h in found.heights])
     axes.set_xlabel(typeset("H_s [m]"))
     axes.set_ylabel(f"payload, rms over all seeds [{unit}]")
@@ -190,8 +192,11 @@ def _lines(found: Comparison, factor: float, unit: str) -> Figure:
     return figure
 
 
-def _span(axes: Axes, found: Comparison, factor: float) -> None:
-    """Set the ends of the axis: a floor that is next to nothing does not press all others flat."""
+def _ends(found: Comparison) -> tuple[float, float]:
+    """Return the ends of the axis [m], at most five decades apart.
+
+    A floor that is next to nothing does not press all others flat, nor does what has diverged.
+    """
     own: list[float] = []
     floor: list[float] = []
     for each in found.contenders:
@@ -199,9 +204,10 @@ def _span(axes: Axes, found: Comparison, factor: float) -> None:
         kept = floor if each.group == "floor" else own
         kept += [value for value in values if math.isfinite(value) and value > 0.0]
     low = min(own or floor)
+    high = min(max(own or floor), _WIDEST * low)
     if own and floor:
         low = min(low, max(min(floor), _FLOOR_SHOWN * low))
-    axes.set_ylim(0.6 * low / factor, 1.6 * max(own or floor) / factor)
+    return 0.6 * low, 1.6 * high
 
 
 def _dots(found: Comparison, factor: float, unit: str) -> Figure:
@@ -217,8 +223,8 @@ def _dots(found: Comparison, factor: float, unit: str) -> Figure:
         mean = found.rms(each.name, height)
         middle = found.pooled(each.name, height) / factor
         if math.isfinite(mean.low):
-            low = max(mean.low / factor, 0.3 * middle)
-            axes.plot([low, mean.high / factor], [place, place], color=colour, linewidth=1.2)
+            span = [mean.low / factor, mean.high / factor]
+            axes.plot(span, [place, place], color=colour, linewidth=1.2)
         axes.plot(middle, place, "|", color=colour, markersize=15, markeredgewidth=2.6)
         lost = found.lost(each.name, height)
         labels.append(f"{each.name}\n(load lost in {lost} of {len(cells)})" if lost else each.name)
@@ -226,10 +232,9 @@ def _dots(found: Comparison, factor: float, unit: str) -> Figure:
     if floor is not None and math.isfinite(found.pooled(floor.name, height)):
         edge = found.pooled(floor.name, height) / factor
         axes.axvspan(1e-9, edge, color=REFERENCE, alpha=0.12, linewidth=0.0)
-    # The floor may be next to nothing: its edge shows that it is there, or it is far away.
-    finite = [c.rms for c in found.cells if math.isfinite(c.rms) and c.rms > 0.0]
-    axes.set_xlim(0.6 * min(finite) / factor, 1.6 * max(finite) / factor)
-    logarithmic(axes, "x", _marks_of(axes.get_xlim()))
+    ends = _ends(found)
+    axes.set_xlim(ends[0] / factor, ends[1] / factor)
+    logarithmic(axes, "x", _marks_of(ends))
     axes.set_yticks(range(len(shown)), labels)
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
@@ -252,13 +257,13 @@ def _about(found: Comparison) -> str:
 def _finding(found: Comparison) -> str:
     """Return what the figure shows, as a title."""
     height = found.heights[-1]
-    best = found.best(height, ("linear", "predictive", "own"))
+    best = found.best(height, ("linear", "filter", "predictive", "own"))
     if best is None:
         return "What is left of the payload's motion"
     text = f"{best} holds best in H_s {height:.4g} m, {quantity(found.pooled(best, height), 'm')}"
     linear = found.best(height, ("linear",))
     if linear is not None and linear != best:
-        times = found.pooled(linear, height) / found.pooled(best, height)
+        times = found.ratio(linear, height, best).mean
         text += f" rms: {number(times, 2)} times less than {linear}"
     else:
         text += " rms"

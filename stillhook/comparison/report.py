@@ -29,13 +29,13 @@ from ..text import (
 from .comparison import COLUMNS, Comparison
 from .figures import heights, worst_moment
 from .store import question_of
-from .words import LEGEND, about_of, left_out, sentences_of, table_at
+from .words import LEGEND, about_of, left_out, sentences_of, tables_at
 
 _FORMAT = 1
 _DIGITS = 10  # of times in files
 _SAME = (
     "Every contender meets the same hook motion for the same seed, on the same nonlinear plant "
-    f"with the drive's limits.  {LEGEND}, pooled over seeds.  `table.csv` has all columns, "
+    f"with the drive's limits.  {LEGEND}.  `table.csv` has all columns, "
     "`runs.csv` every run, `summary.json` both for programs; `cells.jsonl` is what the comparison "
     "goes on from."
 )
@@ -49,7 +49,7 @@ def comparison_report(found: Comparison) -> Report:
         Drawing("heights", "The payload's motion with each contender", lambda: heights(found)),
         Drawing("worst", caption, lambda: worst_moment(found)),
     ]
-    tables = [table_at(found, height) for height in found.heights]
+    tables = [table for height in found.heights for table in tables_at(found, height)]
     return Report(
         name=found.case.name,
         about=about_of(found),
@@ -57,18 +57,23 @@ def comparison_report(found: Comparison) -> Report:
         ok=not any(cell.status in ("failed", "died") for cell in found.cells),
         sections=[
             ReportSection("", [*sentences_of(found), *drawings]),
-            ReportSection("", [*(table for table in tables if table.rows), LEGEND]),
+            ReportSection("", [*tables, LEGEND]),
             ReportSection("", left_out(found)),
         ],
     )
 
 
 def write_comparison(
-    folder: str | Path | OutputFolder, found: Comparison, *, figures: bool = True
+    folder: str | Path | OutputFolder,
+    found: Comparison,
+    *,
+    figures: bool = True,
+    traces: bool = False,
 ) -> list[Path]:
     """Write a comparison into a folder, made if need be, and return the files written.
 
-    `figures` says whether to draw figures.  Raises InputError if a file cannot be written.
+    `figures` says whether to draw figures, `traces` whether to write the time traces around the
+    worst moment, some megabytes.  Raises InputError if a file cannot be written.
     """
     place = OutputFolder.prepare(folder)
     report = comparison_report(found)
@@ -76,7 +81,7 @@ def write_comparison(
     place.write("table.csv", found.table.to_csv(index=False, lineterminator="\n"))
     place.write("runs.csv", csv_text(_runs(found)))
     place.write("summary.json", json_text(comparison_data(found)))
-    if found.traces:
+    if traces and found.traces:
         place.write("traces.csv", csv_text(_traces(found)))
     drawn = place.draw(report.drawings) if figures else []
     text = markdown(_with_contenders(report, found), [path.stem for path in drawn])

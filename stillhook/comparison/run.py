@@ -10,23 +10,25 @@ says why it did not take part.
 
     question, contenders --> Campaign.work (in processes, and here) --> Comparison
 
-Designs come first, since runs wait for them.  A process is given what it has prepared already, as
-long as there is any.
+A first answer comes first: one run of everybody who is made at once.  Then designs, since runs wait
+for them, and what is left; floors come last, where the others have shown that they say anything.
+A process is given what it has prepared already, as long as there is any.
 """
 
 import contextlib
+import math
 import sys
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from models.basics import InputError, check_choice, check_range
 from models.case import Case
 from models.simulation import EASE
 
-from ..controllers import Contender, StoredDesign, contenders_of
+from ..controllers import Contender, StoredDesign, contenders_of, line_up
 from ..keeper import POLL, Alone, Died, Pool, Processes, usable_cores
 from ..runs import seconds_of, seeds_of
 from ..text import Progress
@@ -37,27 +39,35 @@ from .mismatch import Mismatch
 from .store import STORE, Store
 
 _LONGEST = 1e6  # run [s]
+_FLOORS = 3  # seeds of which the floor is computed by default: it takes longer than all others
+_FULL = 0.1  # of the time [%]: less is as good as a drive without limits
 
 
 def compare(
     case: Case,
-    controllers: Sequence[object] | None = None,
+    controllers: Sequence[object] | Literal["all"] | None = None,
     *,
-    seeds: int | Sequence[int] = 10,
-    duration: float | str = "20 min",
+    design: object = None,
+    seeds: int | Sequence[int] = 6,
+    duration: float | str = "5 min",
     heights: Sequence[float] | None = None,
     mismatch: str | Mapping[str, object] | None = None,
     masses: int | None = None,
     settle: float | str | None = None,
     design_at: str = "each",
-    starts: int = 8,
+    starts: int | None = None,
     compiled: bool | None = None,
     jobs: int | None = None,
     out: str | Path | None = None,
     traces: bool = True,
     progress: Progress | None = None,
+    told: Callable[[Comparison], None] | None = None,
 ) -> Comparison:
     """Compare controllers in the same seas, on the same nonlinear plant with its limits.
+
+    Unless others are named, each kind takes part once, which takes under three minutes of processor
+    time on the bundled cases: the design is then searched from one start, and the floor is that
+    of the first three seeds.
 
     Parameters
     ----------
@@ -66,7 +76,10 @@ def compare(
     controllers
         Names of `stillhook.controllers.CONTENDERS`, designs, controllers, and pairs of a
         name and one of these or of a function of the case that returns a controller; by default
-        `stillhook.controllers.DEFAULTS`.
+        `stillhook.controllers.DEFAULTS`, or everybody for "all".
+    design
+        A design, or a pair of a name and one, that takes the place of `combined`, the one that is
+        looked for, where no controllers are named.
     seeds
         How many seas of each height, or their seeds.  The same seed is the same motion of the
         hook for every contender, and the same noise for those with the same sample time.
@@ -88,7 +101,7 @@ def compare(
         "case": once, in the sea of the case.  Those within the drive's limits keep them whether
         the case enforces them or not; the eager ones ignore them (the plant does not).
     starts
-        Starts of the searches for designs.
+        Starts of the searches for designs; by default 1 where no controllers are named, else 8.
     jobs
         Processes that share the work; by default one for each core.  Contenders that cannot be
         sent to another process run in this one.
@@ -99,6 +112,8 @@ def compare(
         Whether to run once more around the worst moment of the best linear law, for a figure.
     progress
         Called as progress(what, done, total), in runs.
+    told
+        Called after every run with the comparison so far.
 
     Returns
     -------
@@ -118,10 +133,16 @@ def compare(
     >>> found.table["runs"].tolist(), found.complete
     ([2, 2], True)
     """
+    brief = controllers is None
+    if brief or controllers == "all":
+        controllers = line_up(case, every=not brief, design=design)
+    elif design is not None:
+        raise InputError("compare: design is for the usual contenders; name it among yours")
     contenders = contenders_of(controllers)
     numbers = seeds_of("compare", seeds)
     lasting = seconds_of("compare: duration", duration, high=_LONGEST)
     check_choice("compare", "design_at", design_at, ("each", "case"))
+    starts = (1 if brief else 8) if starts is None else starts
     check_range("compare", "starts", starts, low=1, high=4096)
     if jobs is not None:
         check_range("compare", "jobs", jobs, low=1, high=512)
@@ -158,7 +179,9 @@ def compare(
             heights=levels,
             seeds=numbers,
             store=store,
+            floors=numbers[:_FLOORS] if brief else numbers,
             progress=progress or (lambda what, done, total: None),
+            told=told,
         )
         complete = True
         try:
@@ -196,7 +219,10 @@ class Campaign:
     heights: tuple[float, ...]
     seeds: tuple[int, ...]
     store: Store | None  #: Where results are kept; None for nowhere.
+    floors: tuple[int, ...]  #: Seeds of which the floor is computed.
     progress: Progress  #: Called as progress(what, done, total), in runs.
+    #: Called after every run with what there is.
+    told: Callable[[Comparison], None] | None = None
     laws: dict[tuple[str, float], StoredDesign] = field(default_factory=dict)
     refused: dict[tuple[str, float], str] = field(default_factory=dict)
     cells: dict[tuple[str, float, int], Cell] = field(default_factory=dict)
@@ -253,7 +279,7 @@ class Campaign:
         traces = []
         for contender in self.contenders:
             cell = self.cells.get((contender.name, height, seed))
-            if cell is None or cell.status in ("failed", "died"):
+            if cell is None or contender.recipe is None or cell.status in ("failed", "died"):
                 continue
             name = contender.name
             task = CellTask(kind="trace", name=name, height=height, seed=seed, moment=moment)
@@ -302,21 +328,50 @@ class Campaign:
             CellTask(kind="run", name=each.name, height=height, seed=seed)
             for each in self.contenders
             for height in self.heights
-            for seed in self.seeds
+            for seed in (self.seeds if each.recipe is not None else self.floors)
         ]
 
     def _todo(self) -> list[CellTask]:
-        """Return what can be done now: designs first, then runs whose design is there."""
+        """Return what can be done now: first runs, designs, then runs whose design is there."""
         known = {**self.laws, **self.no_design}
         designs = [task for task in self._designs() if task.group not in known]
+        left = [
+            task for task in self._runs() if (task.name, task.height, task.seed) not in self.cells
+        ]
+        floors = [task for task in left if self._names[task.name].recipe is None]
         runs = [
             task
-            for task in self._runs()
-            if (task.name, task.height, task.seed) not in self.cells
-            and task.group not in self.refused
-            and not self._waits(task)
+            for task in left
+            if task not in floors and task.group not in self.refused and not self._waits(task)
         ]
-        return designs + runs
+        quick = [task for task in runs if task.seed == self.seeds[0] and self._quick(task)]
+        now = quick + designs + [task for task in runs if task not in quick]
+        if now or not self.under_way.issubset(floors):
+            return now
+        return [task for task in floors if self._worth_it(task.group)]
+
+    def _quick(self, task: CellTask) -> bool:
+        """Return whether a run's controller is made at once."""
+        contender = self._names[task.name]
+        return contender.group in ("brake", "linear") and not contender.needs
+
+    def _worth_it(self, group: tuple[str, float]) -> bool:
+        """Return whether a floor says anything; note why if it does not."""
+        _, height = group
+        full = [
+            cell.quantities.get("saturated share", 0.0)
+            for cell in self.cells.values()
+            if cell.height == height
+            and not cell.lost
+            and self._names[cell.contender].group not in ("brake", "floor")
+        ]
+        if not full or max(full) > _FULL:
+            return True
+        self.refused[group] = (
+            f"no drive is at its limits for over {_FULL:g} % of the time where the load is held, "
+            "and without limits everything known in advance leaves nothing"
+        )
+        return False
 
     def _next(self, pool: Pool, todo: list[CellTask]) -> CellTask:
         """Return what fits best: what an idle process has prepared, then what nobody has."""
@@ -374,11 +429,13 @@ class Campaign:
             self.cells[key] = answer
             if self.store is not None:
                 self.store.add_cell(self._names[task.name], self._law(task), answer)
+        if task.kind == "run" and self.told is not None:
+            self.told(self.comparison(complete=False, seconds=math.nan))
 
     def tell(self, *part: object) -> None:
         """Say what is under way, and how many runs there are; not how far each of them is."""
         del part
-        total = (len(self.contenders) * len(self.heights) - len(self.refused)) * len(self.seeds)
+        total = sum(task.group not in self.refused for task in self._runs())
         what = _words(next(iter(self.under_way))) if self.under_way else ""
         self.progress(what, len(self.cells), max(total, len(self.cells)))
 

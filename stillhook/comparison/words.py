@@ -1,30 +1,29 @@
-"""Tables and sentences of a comparison: where prediction helps, where not, who loses the load.
+"""Tables and sentences of a comparison: what information, filter and plan do, who loses the load.
 
     Comparison --> tables, sentences computed from the numbers
 
 Contenders are compared seed by seed: the ratio of two of them in the same sea varies far less
-than either.  A difference is called one only where Student's 95 % interval of the mean log ratio
-leaves out zero.
+than either.  A difference is called one only where the 95 % interval of the ratio leaves out one,
+and credit is given step by step: to a second sensor, to the filter, to the plan.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from models.basics import Interval, mean_interval
+from models.basics import Interval
 
 from ..text import Column, Table, Written, count, duration, listed, number, percent, quantity, scale
-from .comparison import Comparison
+from .comparison import CAUSAL, Comparison
 
 LEGEND = (
-    "sat.: of the time at the drive's limits; lost: runs in which the payload left its place by "
-    "more than the hook's significant height, or the brake stepped in; residual: of the hook's "
-    "motion; drum held: of the payload's with the drum held; / floor: mean square over the "
-    "clairvoyant's"
+    "rms: pooled over seeds; largest: mean over seeds; sat.: of the time at the drive's limits; "
+    "lost: runs in which the payload left its place by more than the hook's significant height, "
+    "or the brake stepped in; drum held: of the payload's rms with the drum held; residual: of "
+    "the hook's; intervals: 95 %, on a log scale"
 )
 """What the headings of the table mean."""
 
-_NOTHING = 1e-12  # [m]
-_EVEN = math.log(1.25)  # an interval of the log ratio within this says "no difference"
+_EVEN = 1.25  # an interval of the ratio within this factor says "no difference"
 _UNSURE = "cannot be told from so few seeds"
 _MANY = 1000.0  # beyond that a ratio says no more
 
@@ -38,32 +37,33 @@ def about_of(found: Comparison) -> str:
     return f"{text}; the plant is off by {off}" if off else text
 
 
-def table_at(found: Comparison, height: float) -> Table:
-    """Return the table at a height, one row for each contender that has runs."""
-    sizes = [found.pooled(each.name, height) for each in found.contenders]
+def tables_at(found: Comparison, height: float) -> list[Table]:
+    """Return the tables at a height, one row for each contender that has runs: sizes, ratios."""
+    floor = found.floor_at(height)
+    there = [
+        each.name
+        for each in found.contenders
+        if found.of(each.name, height) and (each.group != "floor" or floor is not None)
+    ]
+    if not there:
+        return []
+    every = found.table[found.table["height"] == height].set_index("contender")
+    sizes = [found.pooled(name, height) for name in there]
     factor, unit = scale("m", max((s for s in sizes if math.isfinite(s)), default=1.0))
-    every, rows = found.table, []
-    for each in found.contenders:
-        cells = found.of(each.name, height)
-        if not cells:
-            continue
-        mean = found.rms(each.name, height)
+    rows = []
+    for name in there:
+        row, mean, lost = every.loc[name], found.rms(name, height), found.lost(name, height)
         between = ""
         if math.isfinite(mean.low):
-            between = f"{number(max(mean.low, 0.0) / factor)} to {number(mean.high / factor)}"
-        row = every[(every["contender"] == each.name) & (every["height"] == height)].iloc[0]
-        lost = found.lost(each.name, height)
-        figures = (float(row[name]) for name in ("largest", "saturated"))
+            between = f"{number(mean.low / factor, 2)} to {number(mean.high / factor, 2)}"
         rows.append(
             (
-                each.name,
+                name,
                 mean.mean,
                 between,
-                *figures,
-                Written(lost, f"{lost}/{len(cells)}"),
-                0.01 * float(row["residual"]),
+                *(float(row[column]) for column in ("largest", "saturated")),
+                Written(lost, f"{lost}/{len(found.of(name, height))}"),
                 0.01 * float(row["residual held"]),
-                float(row["of the floor"]),
             )
         )
     heads = (
@@ -73,11 +73,25 @@ def table_at(found: Comparison, height: float) -> Table:
         Column("largest", write=lambda value: number(value / factor)),
         Column("saturated", "sat.", write=lambda share: f"{share:.3g} %"),
         Column("lost"),
-        Column("residual", write=percent),
         Column("residual_held", "drum held", write=percent),
-        Column("of_the_floor", "/ floor"),
     )
-    return Table(columns=heads, rows=rows)
+    sized = Table(columns=heads, rows=rows)
+    best = found.best(height, CAUSAL)
+    over = (
+        Column("contender", "paired by seed"),
+        Column("residual"),
+        Column("over_the_best", f"over {best or 'the best'}"),
+        Column("over_the_floor", "over the floor"),
+    )
+    ratios = [
+        (
+            name,
+            _within(found.residual(name, height), 100.0, " %"),
+            *("" if name == to else _within(found.ratio(name, height, to)) for to in (best, floor)),
+        )
+        for name in there
+    ]
+    return [sized, Table(columns=over, rows=ratios)]
 
 
 def left_out(found: Comparison) -> list[str]:
@@ -94,97 +108,129 @@ def left_out(found: Comparison) -> list[str]:
         if len(heights) < len(found.heights):
             where = f" at H_s {', '.join(f'{height:.4g}' for height in heights)} m"
         lines.append(f"{name} did not take part{where}: {reason}")
+    empty = [
+        height
+        for height in found.heights
+        if found.floor is not None
+        and found.of(found.floor.name, height)
+        and found.floor_at(height) is None
+    ]
+    if empty:
+        where = listed([f"{height:.4g}" for height in empty])
+        text = "everything known in advance leaves under a thousandth of the stillest's rms"
+        lines.append(f"no floor at H_s {where} m: {text}")
     return lines
 
 
 def sentences_of(found: Comparison) -> tuple[str, ...]:
-    """Return what the numbers say: one sentence for each height, and what is the same for all."""
+    """Return what the numbers say: for each height who is still, and what each step is worth."""
     lines = []
     for height in found.heights:
-        linear = found.best(height, ("linear",))
-        predictive = found.best(height, ("predictive",))
         parts = []
+        linear = found.best(height, ("linear",))
         if linear is not None:
             parts.append(_best_linear(found, linear, height))
-        if linear is not None and predictive is not None:
-            parts.append(_against(found, predictive, linear, height, "prediction"))
-        reference = found.best(height, ("reference",))
-        if reference is not None and predictive is not None:
-            parts.append(_against(found, reference, predictive, height, "knowing the future"))
-        own = found.best(height, ("own",))
-        if linear is not None and own is not None:
-            parts.append(_against(found, own, linear, height, ""))
+        parts += [_against(found, *step, height) for step in _steps(found, height)]
         lost = _lost(found, height)
         if lost:
             parts.append(lost)
-        if parts:
-            lines.append(f"H_s {height:.4g} m: {'; '.join(parts)}.")
+        lines += [f"H_s {height:.4g} m: {part}." for part in parts]
     return (*lines, *_overall(found))
 
 
+def _steps(found: Comparison, height: float) -> list[tuple[str, str, str]]:
+    """Return what is credited, to whom, and against whom it is held."""
+    best = {group: found.best(height, (group,)) for group in (*CAUSAL, "reference")}
+    rival, plain, mpc, future = (
+        best[group] for group in ("linear", "filter", "predictive", "reference")
+    )
+    both = _stillest(found, height, lambda heard: {"payload", "mru"} <= heard)
+    single = _stillest(found, height, lambda heard: len(heard) == 1)
+    # The stillest of all is held against, so that no credit comes from a weak rival.
+    own = "filter and plan" if rival == both else "filter, plan and a second sensor"
+    steps = [
+        ("hearing payload and reference unit", both, single),
+        ("the filter of MPC, without its plan", plain, rival),
+        ("planning within the limits", mpc, plain),
+        (own, mpc, rival),
+        ("a controller of one's own", best["own"], rival),
+        ("knowing the future", future, mpc),
+        ("the rest to the floor", found.floor_at(height), mpc or rival),
+    ]
+    return [(what, a, b) for what, a, b in steps if a is not None and b is not None]
+
+
+def _heard(found: Comparison, name: str, height: float) -> set[str]:
+    """Return the sensors of payload and hook that a linear law hears."""
+    contender = found.contender(name)
+    recipe = contender.recipe
+    if contender.group != "linear" or recipe is None:
+        return set()
+    law = recipe.design or found.laws.get((name, height))
+    if law is None:
+        return {"payload"} if name == "thesis" else {"mru"} if "forward" in name else set()
+    sensors = {each.partition(".")[0] for each in law.values.get("measurements", ())}
+    return sensors & {"payload", "mru"}
+
+
+def _stillest(found: Comparison, height: float, wanted: Callable[[set[str]], bool]) -> str | None:
+    """Return who is the stillest of the linear laws whose sensors are wanted."""
+    known = {
+        each.name: value
+        for each in found.contenders
+        if math.isfinite(value := found.pooled(each.name, height))
+        and wanted(_heard(found, each.name, height))
+    }
+    return min(known, key=known.__getitem__, default=None)
+
+
 def _best_linear(found: Comparison, name: str, height: float) -> str:
-    """Return who is the best linear law, against the brake, and how far above the floor."""
+    """Return who is the best linear law, and how it is against the brake."""
     text = f"the best linear law is {name}, {quantity(found.pooled(name, height), 'm')} rms"
     lost = found.lost(name, height)
     if lost:
         text += (
             f" though it loses the load in {lost} of {count(len(found.of(name, height)), 'run')}"
         )
-    held = found.best(height, ("brake",))
-    if held is not None and found.pooled(name, height) > 0.0:
-        share = found.pooled(held, height) / found.pooled(name, height)
-        side = "less" if share >= 1.0 else "more"
-        times = max(share, 1.0 / share)
-        factor = number(times, 2) if times < _MANY else f"over {_MANY:.0f}"
-        text += f", {factor} times {side} than with the drum held"
-    if found.floor is not None:
-        least = found.pooled(found.floor.name, height)
-        if least > 0.0:
-            text += f"; the floor is {quantity(least, 'm')}"
+    ratio = found.ratio(name, height, found.best(height, ("brake",)))
+    if math.isfinite(ratio.mean):
+        text += f", {_within(ratio)} times that with the drum held"
     return text
 
 
-def _against(found: Comparison, name: str, other: str, height: float, what: str) -> str:
-    """Return whether one contender is better than another, seed by seed."""
-    ratios = _log_ratios(found, name, other, height)
-    label = f"{name} ({what})" if what else name
-    if not ratios:
-        return f"{label} and {other} have no run in common"
-    mean = mean_interval(ratios)
-    factor = math.exp(mean.mean)
-    if math.isnan(mean.low):
-        side = "less" if factor < 1.0 else "more"
-        times = number(max(factor, 1.0 / factor), 2)
-        return f"{label} moves the load {times} times {side} than {other}, in a single sea"
-    verdict, ends = _verdict(mean), (mean.low, mean.high)
-    if mean.high < 0.0:  # as many times less
-        ends = (-mean.high, -mean.low)
-    band = " to ".join(number(math.exp(end), 2) for end in ends)
-    if mean.low <= 0.0 <= mean.high:
-        than = f"{band} times the rms of {other}"
-    else:
-        than = f"{band} times {'less' if mean.high < 0.0 else 'more'} rms than {other}"
-    if verdict == _UNSURE:
-        return f"whether {label} helps cannot be told from {count(len(ratios), 'seed')}: {than}"
-    return f"{label} {verdict}: {than}"
+def _against(found: Comparison, what: str, name: str, other: str, height: float) -> str:
+    """Return whether what is credited to one contender makes it better than another."""
+    ratio = found.ratio(name, height, other)
+    if not ratio.count:
+        return f"{what}: {name} and {other} have no run in common"
+    text = f"{what}: {name} has {_within(ratio)} times the rms of {other}"
+    if ratio.count == 1:
+        return f"{text}, in a single sea"
+    if found.contender(name).group == "floor":
+        return text
+    return f"{text}; {_it(_verdict(ratio))}"
 
 
-def _verdict(mean: Interval) -> str:
-    """Return what an interval of the mean log ratio says."""
-    if mean.high < 0.0:
+def _within(ratio: Interval, factor: float = 1.0, unit: str = "") -> str:
+    """Return a ratio with its interval."""
+    if not math.isfinite(ratio.mean):
+        return ""
+    if ratio.mean > _MANY:
+        return f"over {number(factor * _MANY, 4)}{unit}"
+    text, low, high = (number(factor * each, 2) for each in (ratio.mean, ratio.low, ratio.high))
+    return f"{text}{unit}" if math.isnan(ratio.low) else f"{text}{unit} ({low} to {high})"
+
+
+def _verdict(ratio: Interval) -> str:
+    """Return what an interval of a ratio says."""
+    if ratio.high < 1.0:
         return "helps"
-    told = mean.low > 0.0 or max(-mean.low, mean.high) <= _EVEN
+    told = ratio.low > 1.0 or (ratio.low >= 1.0 / _EVEN and ratio.high <= _EVEN)
     return "does not help" if told else _UNSURE
 
 
-def _log_ratios(found: Comparison, name: str, other: str, height: float) -> list[float]:
-    theirs = {cell.seed: cell.rms for cell in found.of(other, height)}
-    pairs = [(cell.rms, theirs.get(cell.seed, math.nan)) for cell in found.of(name, height)]
-    return [
-        math.log(max(a, _NOTHING) / max(b, _NOTHING))
-        for a, b in pairs
-        if math.isfinite(a) and math.isfinite(b)
-    ]
+def _it(verdict: str) -> str:
+    return f"{'whether it helps' if verdict == _UNSURE else 'it'} {verdict}"
 
 
 def _lost(found: Comparison, height: float) -> str:
@@ -198,23 +244,15 @@ def _lost(found: Comparison, height: float) -> str:
 
 
 def _overall(found: Comparison) -> Sequence[str]:
-    """Return at which heights prediction helps and at which it does not."""
+    """Return at which heights planning helps and at which it does not, where there are several."""
     verdicts: dict[str, list[float]] = {"helps": [], "does not help": [], _UNSURE: []}
     for height in found.heights:
-        linear, best = found.best(height, ("linear",)), found.best(height, ("predictive",))
-        if linear is None or best is None:
-            continue
-        ratios = _log_ratios(found, best, linear, height)
-        verdicts[_verdict(mean_interval(ratios)) if ratios else _UNSURE].append(height)
+        plain, mpc = found.best(height, ("filter",)), found.best(height, ("predictive",))
+        if plain is not None and mpc is not None and len(found.heights) > 1:
+            verdicts[_verdict(found.ratio(mpc, height, plain))].append(height)
     parts = [
-        f"it {verdict} at H_s {listed([f'{h:.4g}' for h in heights])} m"
+        f"{_it(verdict)} at H_s {listed([f'{h:.4g}' for h in heights])} m"
         for verdict, heights in verdicts.items()
         if heights
     ]
-    if not parts:
-        if any(each.group == "predictive" for each in found.contenders):
-            return (
-                "Whether prediction helps cannot be told: there is nothing to compare it with.",
-            )
-        return ()
-    return (f"Prediction against the best linear law: {'; '.join(parts)}.",)
+    return (f"Planning within the limits: {'; '.join(parts)}.",) if parts else ()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .contenders import CONTENDERS, DEFAULTS, Contender, contenders_of
+    from .contenders import ALL, CONTENDERS, DEFAULTS, DESIGNED, Contender, contenders_of, line_up
     from .named import CONTROLLER_TEXTS, controller_of
     from .recipe import Recipe, recipe_from, recipe_of
     from .stored_design import StoredDesign, design_law

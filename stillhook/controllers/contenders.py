@@ -9,15 +9,16 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from models.basics import InputError, pick
+from models.case import Case
 from synth.design import Design, Tuning
 
 from .named import CONTROLLER_TEXTS
 from .recipe import Make, Recipe, feedback, recipe_of, thesis
 from .stored_design import EAGER, HALF
 
-GROUPS = ("brake", "linear", "predictive", "own", "reference", "floor")
-"""What contenders are: brake, linear laws, causal prediction, the user's own, those that know
-what nobody can know, and the floor, which is no controller at all."""
+GROUPS = ("brake", "linear", "filter", "predictive", "own", "reference", "floor")
+"""What contenders are: brake, linear laws, the filter of MPC without its plan, causal prediction,
+the user's own, those that know what nobody can know, and the floor, which is no controller."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,6 +86,7 @@ _ALL = (
     _named("none", "nothing", "brake"),
     _named("constant-tension", "load cell and motor", "linear"),
     _named("feed-forward", "motion reference unit", "linear"),
+    _named("feed-forward-full", "motion reference unit", "linear"),
     _linear("thesis", "", "the gains that the case has in use", "payload by telemetry", thesis),
     *(
         _linear(
@@ -96,6 +98,7 @@ _ALL = (
         for name, (structure, what, heard) in _DESIGNED.items()
         for ending, needs, how in _WAYS
     ),
+    _named("mpc-clipped", f"{_SEEN}; the sea's spectrum", "filter"),
     _named("mpc", f"{_SEEN}; the sea's spectrum", "predictive"),
     _named("mpc-ar", f"{_SEEN}; nothing of the sea", "predictive"),
     _named("nonlinear-mpc", f"{_SEEN}, its limits and drag; the sea's spectrum", "predictive"),
@@ -116,20 +119,36 @@ CONTENDERS: Mapping[str, Contender] = MappingProxyType({each.name: each for each
 # static gains cannot wind up.
 LEFT_OUT = ("feedback-no-antiwindup",)
 
-DEFAULTS = tuple(name for name in CONTENDERS if name not in LEFT_OUT)
-"""Who takes part unless others are named."""
+ALL = tuple(name for name in CONTENDERS if name not in LEFT_OUT)
+"""Everybody who can do anything in a case."""
+
+DESIGNED = "combined"
+"""Who stands for the best design of a case: MPC hears both sensors, and so does its rival."""
+
+DEFAULTS = (
+    *("none", "constant-tension", "feed-forward", "feed-forward-full", "thesis", DESIGNED),
+    *("mpc-clipped", "mpc", "clairvoyant"),
+)
+"""Who takes part unless others are named: each kind once."""
 
 
-def contenders_of(wanted: Sequence[object] | None) -> tuple[Contender, ...]:
+def line_up(case: Case, *, every: bool = False, design: object = None) -> list[object]:
+    """Return who takes part in a case unless others are named: `DEFAULTS`, or `ALL` if `every`.
+
+    A design that is given stands in for the one that would be looked for.
+    """
+    names = [n for n in (ALL if every else DEFAULTS) if n != "thesis" or case.gains is not None]
+    return [design if n == DESIGNED and design is not None else n for n in names]
+
+
+def contenders_of(wanted: object) -> tuple[Contender, ...]:
     """Return the contenders meant by names of `CONTENDERS`, or whatever else `recipe_of` takes.
-
-    None stands for `DEFAULTS`.
 
     Raises InputError if there is none, a name is unknown or comes twice, or one is none of these.
     """
-    if wanted is not None and (isinstance(wanted, str) or not isinstance(wanted, Sequence)):
+    if isinstance(wanted, str) or not isinstance(wanted, Sequence):
         wanted = [wanted]
-    found = tuple(_contender(each) for each in (DEFAULTS if wanted is None else wanted))
+    found = tuple(_contender(each) for each in wanted)
     if not found:
         raise InputError("compare: at least one controller is wanted, got none")
     names = [each.name for each in found]

@@ -8,6 +8,7 @@ imported when one is made, as they bring a solver along.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -30,10 +31,12 @@ CONTROLLER_TEXTS: Mapping[str, str] = MappingProxyType(
         "feedback": "a design, or the three gains that the case has in use",
         "feedback-no-antiwindup": "the same without anti-windup, for a controller with states",
         "feed-forward": "the drum pays out 0.9 of the hook's speed",
-        "feed-forward-lead": "the same, with the delays of sensor and drive made up for",
+        "feed-forward-full": "the drum pays out all of the hook's speed",
+        "feed-forward-lead": "0.9 of it, with the delays of sensor and drive made up for",
         "constant-tension": "the drive keeps the rope's tension within a dead band",
         "none": "the drum held by its brake",
         "mpc": "linear MPC, the hook predicted by a Kalman filter",
+        "mpc-clipped": "the same filter and law without limits, cut off at the drive's",
         "mpc-ar": "linear MPC, the hook predicted by an adaptive AR model",
         "mpc-preview": "linear MPC that is told the hook's future, for reference",
         "nonlinear-mpc": "MPC on the nonlinear plant: drag, slack rope and the drive's limits",
@@ -69,6 +72,9 @@ def controller_by_name(
 
         makers: Mapping[str, Callable[..., Controller]] = {
             "feed-forward": VelocityFeedForward,
+            "feed-forward-full": functools.partial(
+                VelocityFeedForward, share=1.0, name="feed-forward-full"
+            ),
             "feed-forward-lead": VelocityFeedForward.with_lead,
             "constant-tension": ConstantTension,
             "none": BrakeOn,
@@ -81,8 +87,10 @@ def controller_by_name(
         from mpc.nonlinear import NonlinearMPC
 
         return NonlinearMPC(case, sample_time=T)
-    from mpc.linear import LinearMPC
+    from mpc.linear import ClippedMPC, LinearMPC
 
+    if name == "mpc-clipped":
+        return ClippedMPC(case, sample_time=T)
     if name == "mpc":
         return LinearMPC(case, sample_time=T)
     return LinearMPC(case, sample_time=T, predictor="ar" if name == "mpc-ar" else "preview")

@@ -33,12 +33,12 @@ def test_a_comparison_ends_well_and_fills_its_folder(run):
         "thesis-1975: 2 contenders, H_s 0.4, 0.6 m, 2 seeds of 30 s",
         "H_s 0.4 m",
         "H_s 0.6 m: the best linear law is feed-forward, ",
-        "Written to here: case.yaml, table.csv, runs.csv, summary.json, traces.csv, summary.md, "
-        "figures",
+        "Written to here: case.yaml, table.csv, runs.csv, summary.json, summary.md, figures",
     ):
         assert text in ending.out, text
     names = {path.name for path in Path("here").iterdir()}
-    assert {STORE, "summary.md", "heights.svg", "worst.png", "traces.csv"} <= names
+    assert {STORE, "summary.md", "heights.svg", "worst.png"} <= names
+    assert "traces.csv" not in names
     content = json.loads(Path("here/summary.json").read_text(encoding="utf-8"))
     assert content["seeds"] == [0, 1]
     assert content["question"]["duration"] == 30.0
@@ -67,6 +67,9 @@ def test_the_same_command_again_computes_nothing(run, monkeypatch):
         (("--controllers", "none,none"), "must have names that differ"),
         (("--controllers", "nothing.yaml"), "nothing.yaml"),
         (("--jobs", "0"), "jobs"),
+        (("--design", "nothing.yaml"), "nothing.yaml"),
+        (("--controllers", "none", "--all"), "give --controllers or --all, not both"),
+        (("--controllers", "none", "--design", "mine.yaml"), "mine.yaml"),
         (("--settle", "30 s", "--duration", "30 s"), "settle"),
     ],
 )
@@ -95,6 +98,29 @@ def test_a_design_file_takes_part_under_its_name(run):
     rows = json.loads(Path("o/summary.json").read_text(encoding="utf-8"))["table"]
     assert [row["contender"] for row in rows] == ["thesis", "mine"]
     assert rows[0]["payload rms"] == rows[1]["payload rms"]
+
+
+def test_time_traces_come_on_request(run):
+    words = (*CALM, *WHO, *SHORT, "--no-figures", "--out", "here")
+    assert run(*words, "--traces").status == 0
+    assert Path("here/traces.csv").read_text(encoding="utf-8").startswith("contender,time [s],")
+    assert run(*words).status == 0
+    assert not Path("here/traces.csv").exists()
+
+
+def test_on_a_terminal_the_first_seed_of_each_is_told_as_it_comes(run, monkeypatch):
+    from stillhook.commands.study import compare
+
+    class Terminal:
+        is_terminal = True
+
+    real = compare.console
+    monkeypatch.setattr(compare, "console", lambda stderr=False: Terminal if stderr else real())
+    ending = run(*CALM, *WHO, *SHORT, "--no-figures", "--out", "here")
+    none, forward = ending.err.splitlines()
+    assert none.startswith("  H_s 0.5 m: none, ")
+    assert forward.startswith("  H_s 0.5 m: feed-forward, ")
+    assert forward.endswith(" of the hook's motion (first seed)")
 
 
 def test_who_may_take_part_can_be_read(run):

@@ -24,7 +24,7 @@ from stillhook.comparison.cell import Cell, ComparisonQuestion, Prepared
 from stillhook.comparison.figures import heights, worst_moment
 from stillhook.comparison.mismatch import Mismatch
 from stillhook.comparison.store import STORE
-from stillhook.controllers import CONTENDERS, DEFAULTS, StoredDesign, contenders_of
+from stillhook.controllers import ALL, CONTENDERS, DEFAULTS, StoredDesign, contenders_of
 from synth.controllers import LinearFeedback
 
 CASE = load_case("thesis-1975").replace({"sea.significant_height": 0.5})
@@ -176,7 +176,7 @@ def test_a_comparison_that_was_stopped_goes_on_and_ends_the_same(tmp_path, monke
         CellBench, "do", lambda self, task, p=None: done.append(task) or do(self, task)
     )
     then = sh.compare(CASE, ["none", "feed-forward"], jobs=1, out=tmp_path, **FAST)
-    assert [(task.name, task.seed) for task in done] == [("feed-forward", 0), ("feed-forward", 1)]
+    assert [(task.name, task.seed) for task in done] == [("none", 1), ("feed-forward", 1)]
     assert then.complete
     assert numbers(then) == numbers(whole)
     assert then.table.drop(columns=["step median"]).equals(
@@ -186,6 +186,94 @@ def test_a_comparison_that_was_stopped_goes_on_and_ends_the_same(tmp_path, monke
     more = sh.compare(CASE, ["none", "feed-forward"], jobs=1, out=tmp_path, **{**FAST, "seeds": 3})
     assert [(task.name, task.seed) for task in done] == [("none", 2), ("feed-forward", 2)]
     assert numbers(more)[:2] == numbers(whole)[:2]
+
+
+def test_a_first_answer_of_everybody_comes_before_a_second_seed_and_any_design(monkeypatch):
+    done, seen = tasks_done(monkeypatch), []
+    law = StoredDesign.of(thesis_design())
+    monkeypatch.setattr("stillhook.comparison.bench.design_law", lambda *given: law)
+    sh.compare(
+        CASE, ["combined", "none", "feed-forward"], jobs=1, told=lambda f: seen.append(f), **FAST
+    )
+    order = [(task.kind, task.name, task.seed) for task in done]
+    assert order[:2] == [("run", "none", 0), ("run", "feed-forward", 0)]
+    assert order[2] == ("design", "combined", -1)
+    assert [len(found.cells) for found in seen] == [1, 2, 3, 4, 5, 6]
+    assert seen[1].pooled("feed-forward", 0.5) > 0.0
+
+
+def test_each_kind_takes_part_once_unless_others_are_named(monkeypatch):
+    asked = []
+
+    def noted(self, task, progress=None):
+        asked.append(task)
+        told = {"tracking error rms": 0.1, "tracking error largest": 0.3, "saturated share": 1.0}
+        if task.kind == "design":
+            return StoredDesign.of(thesis_design())
+        return Cell(
+            contender=task.name,
+            height=task.height,
+            seed=task.seed,
+            status="completed",
+            quantities=told,
+        )
+
+    monkeypatch.setattr(CellBench, "do", noted)
+    found = sh.compare(CASE, jobs=1, traces=False)
+    assert [each.name for each in found.contenders] == list(DEFAULTS)
+    assert (len(found.seeds), found.question.duration, found.question.starts) == (6, 300.0, 1)
+    assert len(found.of("mpc", 0.5)) == 6
+    assert [cell.seed for cell in found.of("clairvoyant", 0.5)] == [0, 1, 2]
+    assert asked[-1].name == "clairvoyant"
+    every = sh.compare(CASE, "all", jobs=1, traces=False)
+    assert [each.name for each in every.contenders] == list(ALL)
+    assert (every.question.starts, len(every.of("clairvoyant", 0.5))) == (8, 6)
+    own = sh.compare(CASE, design=("mine", thesis_design()), jobs=1, traces=False)
+    names = [each.name for each in own.contenders]
+    assert "combined" not in names
+    assert names[5] == "mine"
+    without = CASE.replace({"gains": None})
+    assert "thesis" not in [each.name for each in sh.compare(without, jobs=1).contenders]
+    with pytest.raises(sh.InputError, match="design is for the usual contenders"):
+        sh.compare(CASE, ["none"], design=thesis_design())
+
+
+@pytest.mark.parametrize(
+    ("shares", "computed"), [([0.0, 0.05], False), ([0.0, 0.2], True), ([None, 90.0], False)]
+)
+def test_there_is_no_floor_where_no_drive_is_at_its_limits(monkeypatch, shares, computed):
+    def noted(self, task, progress=None):
+        told = {"tracking error rms": 0.1, "tracking error largest": 0.3}
+        # None: at its limits all the time, and without the load.
+        share = shares[1] if task.name == "mpc" else shares[0]
+        told["saturated share"] = 90.0 if share is None else share
+        if share is None or (shares[0] is None and task.name == "mpc"):
+            told["lost lock at"] = 10.0
+        return Cell(
+            contender=task.name,
+            height=task.height,
+            seed=task.seed,
+            status="completed",
+            quantities=told,
+        )
+
+    monkeypatch.setattr(CellBench, "do", noted)
+    found = sh.compare(CASE, ["feed-forward", "clairvoyant", "mpc"], jobs=1, **FAST)
+    # Where nobody holds the load, nobody can say that the floor is idle.
+    assert bool(found.of("clairvoyant", 0.5)) is (computed or shares[0] is None)
+    shown = " ".join(terminal_text(comparison_report(found), width=300).split())
+    reason = "clairvoyant did not take part: no drive is at its limits for over 0.1 % of the time"
+    assert (reason in shown) is not bool(found.of("clairvoyant", 0.5))
+
+
+def test_a_floor_that_is_next_to_nothing_makes_no_ratio():
+    found = fabricated({"feed-forward": [0.1, 0.3], "clairvoyant": [1e-10, 2e-10]})
+    assert found.floor_at(0.5) is None
+    assert math.isnan(found.table.iloc[0]["over the floor"])
+    shown = " ".join(terminal_text(comparison_report(found), width=300).split())
+    assert "no floor at H_s 0.5 m: everything known in advance leaves under a thousandth" in shown
+    low, high = heights(found).axes[0].get_xlim()
+    assert high / low < 1e3
 
 
 def test_a_line_that_a_crash_cut_short_is_made_again(tmp_path):
@@ -446,63 +534,88 @@ def fabricated(rms: dict[str, list[float]], lost: tuple[str, ...] = ()) -> Compa
     )
 
 
-def test_means_intervals_and_pooled_values_are_those_of_the_textbook():
+def test_rms_and_ratios_are_pooled_and_their_intervals_logarithmic():
     values = [0.1, 0.3, 0.2, 0.25]
     found = fabricated({"feed-forward": values, "clairvoyant": [0.05, 0.1, 0.1, 0.1]})
     row = found.table.iloc[0]
-    half = 3.182446305284263 * np.std(values, ddof=1) / 2.0  # Student's t, 3 degrees, 97.5 %
-    assert row["payload rms"] == pytest.approx(np.mean(values), rel=1e-12)
-    assert row["payload rms low"] == pytest.approx(np.mean(values) - half, rel=1e-9)
-    assert row["pooled rms"] == pytest.approx(math.sqrt(0.2025 / 4.0), rel=1e-12)
-    assert row["of the floor"] == pytest.approx(0.2025 / 0.0325, rel=1e-12)
+    squares, student = np.square(values), 3.182446305284263  # 3 degrees, 97.5 %
+    # of a mean of four, and half of it as the root is taken
+    half = student * squares.std(ddof=1) / squares.mean() / 2.0 / 2.0
+    rms = math.sqrt(0.2025 / 4.0)
+    assert row["payload rms"] == pytest.approx(rms, rel=1e-12)
+    assert row["payload rms low"] == pytest.approx(rms * math.exp(-half), rel=1e-9)
+    assert row["payload rms high"] == pytest.approx(rms * math.exp(half), rel=1e-9)
+    assert row["over the floor"] == pytest.approx(math.sqrt(0.2025 / 0.0325), rel=1e-12)
+    other = np.square([0.05, 0.1, 0.1, 0.1])
+    spread = (squares / squares.mean() - other / other.mean()).std(ddof=1)
+    high = row["over the floor"] * math.exp(student * spread / 2.0 / 2.0)
+    assert row["over the floor high"] == pytest.approx(high, rel=1e-9)
     assert (row["worst seed"], row["worst seed rms"]) == (1, 0.3)
 
 
 def test_the_floor_is_compared_on_the_seeds_that_both_have():
     found = fabricated({"feed-forward": [0.1, 0.3], "clairvoyant": [0.05, math.nan]})
-    assert found.table.iloc[0]["of the floor"] == pytest.approx(4.0)
+    assert found.table.iloc[0]["over the floor"] == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(
-    ("predicted", "told", "overall"),
+    ("predicted", "told"),
     [
-        ([0.05, 0.11, 0.16, 0.19], "mpc (prediction) helps: 1.9 to 2.1 times less", "helps at H_s"),
-        (
-            [0.2, 0.45, 0.6, 0.81],
-            "mpc (prediction) does not help: 1.9 to 2.1 times more",
-            "does not",
-        ),
-        ([0.1, 0.22, 0.30, 0.40], "mpc (prediction) does not help: ", "does not help"),
-        (
-            [0.01, 0.9, 0.05, 1.9],
-            "helps cannot be told from 4 seeds: ",
-            "cannot be told from so few",
-        ),
+        ([0.05, 0.11, 0.16, 0.19], "0.50 (0.47 to 0.53) times the rms of mpc-clipped; it helps"),
+        ([0.2, 0.45, 0.6, 0.81], "2.0 (1.9 to 2.2) times the rms of mpc-clipped; it does not"),
+        ([0.1, 0.22, 0.31, 0.40], "times the rms of mpc-clipped; it does not help"),
+        ([0.01, 0.22, 0.02, 0.6], "; whether it helps cannot be told from so few seeds"),
     ],
 )
-def test_where_prediction_helps_is_read_off_the_numbers(predicted, told, overall):
-    found = fabricated({"feed-forward": [0.1, 0.22, 0.31, 0.39], "mpc": predicted})
-    first, last = sentences_of(found)[0], sentences_of(found)[-1]
-    assert told in first
-    assert last.startswith("Prediction against the best linear law: it ")
-    assert overall in last
+def test_what_planning_is_worth_is_read_off_the_numbers(predicted, told):
+    found = fabricated({"mpc-clipped": [0.1, 0.22, 0.31, 0.39], "mpc": predicted})
+    (sentence,) = sentences_of(found)
+    assert sentence.startswith("H_s 0.5 m: planning within the limits: mpc has ")
+    assert told in sentence
 
 
-def test_the_interval_of_a_ratio_is_that_of_paired_logarithms():
-    linear, predicted = np.array([0.1, 0.22, 0.31]), np.array([0.04, 0.1, 0.13])
-    found = fabricated({"feed-forward": linear.tolist(), "mpc": predicted.tolist()})
-    logs = np.log(linear / predicted)
-    half = 4.302652729749464 * logs.std(ddof=1) / math.sqrt(3.0)
-    low, high = np.exp(logs.mean() - half), np.exp(logs.mean() + half)
-    assert (
-        f"helps: {low:.1f} to {high:.1f} times less rms than feed-forward" in sentences_of(found)[0]
+def test_sensors_filter_and_plan_are_credited_apart_and_against_the_stillest_rival():
+    rms = {
+        "none": [1.0, 1.1],
+        "feed-forward": [0.2, 0.21],
+        "thesis": [0.3, 0.31],
+        "combined": [0.1, 0.11],
+        "mpc-clipped": [0.04, 0.05],
+        "mpc": [0.02, 0.021],
+        "mpc-preview": [0.01, 0.011],
+        "clairvoyant": [0.008, 0.009],
+    }
+    values = {"measurements": ["payload.velocity", "mru.heave"]}
+    law = StoredDesign(values=values, ok=True)
+    found = dataclasses.replace(fabricated(rms), laws={("combined", 0.5): law})
+    parts = [
+        (text.split(": ")[1], text.split(": ")[2].split(" ")[0], text.split(" of ")[-1][:12])
+        for text in sentences_of(found)[1:]
+    ]
+    assert [(what, who) for what, who, _ in parts] == [
+        ("hearing payload and reference unit", "combined"),
+        ("the filter of MPC, without its plan", "mpc-clipped"),
+        ("planning within the limits", "mpc"),
+        ("filter and plan", "mpc"),
+        ("knowing the future", "mpc-preview"),
+        ("the rest to the floor", "clairvoyant"),
+    ]
+    rivals = ["feed-forward", "combined", "mpc-clipped", "combined", "mpc", "mpc"]
+    for text, rival in zip(sentences_of(found)[1:], rivals, strict=True):
+        assert f" times the rms of {rival}" in text
+    # A combined design that is worse than feed-forward gets nobody any credit.
+    worse = dataclasses.replace(
+        fabricated(rms | {"combined": [0.5, 0.51]}), laws={("combined", 0.5): law}
     )
+    told = sentences_of(worse)
+    assert "combined has 2.5 (2.0 to 3.0) times the rms of feed-forward; it does not" in told[1]
+    assert "filter, plan and a second sensor: mpc has 0.10" in told[4]
+    assert "times the rms of feed-forward; it helps" in told[4]
 
 
 def test_a_single_seed_is_not_called_a_difference():
     found = fabricated({"feed-forward": [0.2], "mpc": [0.1]})
-    assert "2.0 times less than feed-forward, in a single sea" in sentences_of(found)[0]
-    assert "cannot be told from so few seeds" in sentences_of(found)[-1]
+    assert "mpc has 0.50 times the rms of feed-forward, in a single sea" in sentences_of(found)[1]
 
 
 def test_who_loses_the_load_is_said():
@@ -510,7 +623,7 @@ def test_who_loses_the_load_is_said():
     assert found.cliff("thesis") == 0.5
     assert math.isnan(found.cliff("none"))
     assert "though it loses the load in 2 of 2 runs" in sentences_of(found)[0]
-    assert "3.2 times more than with the drum held" in sentences_of(found)[0]
+    assert "3.2 (0.070 to 143) times that with the drum held" in sentences_of(found)[0]
 
 
 def test_a_run_that_diverged_is_infinitely_bad():
@@ -540,7 +653,10 @@ def test_folder_and_figures_say_what_was_found(tmp_path):
     written = {path.name for path in sh.write_comparison(tmp_path, found)}
     figures = {f"{name}.{kind}" for name in ("heights", "worst") for kind in ("svg", "png")}
     tables = {"case.yaml", "table.csv", "runs.csv", "traces.csv", "summary.json", "summary.md"}
-    assert written == figures | tables
+    assert written == figures | tables - {"traces.csv"}
+    assert not (tmp_path / "traces.csv").exists()
+    again = {path.name for path in sh.write_comparison(tmp_path, found, traces=True)}
+    assert again == figures | tables
     content = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert [row["contender"] for row in content["table"]] == [
         name for name in ("none", "feed-forward", "thesis") for _ in range(2)
