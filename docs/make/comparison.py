@@ -27,11 +27,13 @@ CSV = ROOT / "docs" / "data" / "comparison.csv"
 PAGE = ROOT / "docs" / "compare.md"
 HEIGHTS = (1.0, 1.25, 1.9, 2.43, 3.75)  # H_s [m]
 CALM = (0.5, 1.0)  # H_s where next to nothing saturates [m]
-LINEAR = ("none", "thesis", "feedback", "feedback-half", "combined", "combined-half")
+INDUSTRY = ("constant-tension", "feed-forward", "feed-forward-full")
+LINEAR = ("none", *INDUSTRY, "thesis", "feedback", "feedback-half", "combined", "combined-half")
 EAGER = "combined-eager"
 PREDICTIVE = ("mpc", "mpc-preview", "nonlinear-mpc")
 FLOOR = "clairvoyant"
-ORDER = (*LINEAR, "feedback-eager", EAGER, *PREDICTIVE, FLOOR)
+FILTER = "mpc-clipped"
+ORDER = (*LINEAR, "feedback-eager", EAGER, FILTER, *PREDICTIVE, FLOOR)
 CASES = ("thesis-1975", "thesis-1975-rope")
 COLUMNS = (
     *("case", "noise", "mismatch", "contender", "height", "seed", "rms", "largest"),
@@ -86,6 +88,9 @@ PARTS: Mapping[str, Part] = {
         case=_ONE, contenders=("thesis", "feedback-eager", EAGER, "mpc"), seeds=6, heights=CALM
     ),
     "rope-calm": Part(case=_ROPE, contenders=(EAGER, "mpc"), seeds=3, heights=CALM[:1]),
+    "one-industry": Part(case=_ONE, contenders=INDUSTRY, seeds=10, heights=(CALM[0], *HEIGHTS)),
+    "rope-industry": Part(case=_ROPE, contenders=INDUSTRY, seeds=6, heights=(CALM[0], *HEIGHTS)),
+    "one-filter": Part(case=_ONE, contenders=(FILTER,), seeds=6, heights=HEIGHTS[:4]),
     "one-linear": Part(case=_ONE, contenders=("none", "thesis", "feedback", "combined"), seeds=10),
     "rope-linear": Part(case=_ROPE, contenders=("none", EAGER), seeds=6),
 }
@@ -209,7 +214,8 @@ def floor_table(rows: Sequence[Mapping[str, str]]) -> str:
                 worst.append("-")
                 continue
             ours, least = pooled(own[key] for key in here), pooled(floor[key] for key in here)
-            ratios.append(_number((ours / least) ** 2))
+            # A floor of micrometres makes ratios that say nothing.
+            ratios.append(_number((ours / least) ** 2) if least >= 1.0 else "-")
             within = sum(
                 float(own[key]["rms"]) <= factor * float(floor[key]["rms"]) + 0.02 for key in here
             )
@@ -246,7 +252,7 @@ def mismatch_table(rows: Sequence[Mapping[str, str]]) -> str:
 def calm_table(rows: Sequence[Mapping[str, str]]) -> str:
     """Return the table of calm seas: the best linear law of each height against MPC."""
     lines = ["| case | $H_s$ | best linear law | leaves | `mpc` leaves |", "| --- |" + " --- |" * 4]
-    linear = [name for name in ORDER if name not in (*PREDICTIVE, FLOOR)]
+    linear = [name for name in ORDER if name not in (FILTER, *PREDICTIVE, FLOOR)]
     for case in CASES:
         for height in CALM:
             found = {

@@ -149,7 +149,7 @@ def write_runs(
     folder: str | Path,
     compared: Sequence[Runs],
     *,
-    format: TraceFormat = "csv",
+    format: TraceFormat = "none",
     figures: bool = True,
     question: Mapping[str, object] | None = None,
 ) -> list[Path]:

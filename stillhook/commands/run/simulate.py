@@ -92,7 +92,7 @@ ARGUMENTS = (
 
         results:
         --out DIR  folder for the results (default: out/<case>-<scenario>)
-        --traces {csv,parquet,netcdf,none} [csv]  format of the time traces (default: csv)
+        --traces {csv,parquet,netcdf,none} [none]  write time traces, in this format
         --store-step TIME  time between two rows of them (default: so that there are at most 40 000)
         """,
         seeds=within(low=1, high=_MANY),
@@ -296,7 +296,7 @@ def _next(
 
 def _again(arguments: argparse.Namespace, case: str, **changes: object) -> str:
     """Return the command that does the same again, with changes."""
-    fresh: dict[str, object] = {"set": [], "out": None, "traces": "csv"}
+    fresh: dict[str, object] = {"set": [], "out": None, "traces": "none"}
     words = changed_words(arguments, ARGUMENTS, **(fresh | changes))
     return " ".join(["stillhook simulate", case, *map(shlex.quote, words)])
 

@@ -45,6 +45,9 @@ def summary(folder: str = "here") -> dict:
 
 def test_a_simulation_ends_well_and_fills_its_folder(run):
     ending = run("simulate", *CALM, "--seeds", "2", "--duration", "40 s", "--out", "here")
+    assert not Path("here/runs").exists()
+    words = ("--seeds", "2", "--duration", "40 s", "--out", "here", "--traces", "csv")
+    ending = run("simulate", *CALM, *words)
     assert (ending.status, ending.err) == (0, "")
     figures = {f"{n}.{k}" for n in ("traces", "strip", "exceedance") for k in ("svg", "png")}
     words = {"case.yaml", "summary.json", "summary.md", "events.csv", "runs"}
@@ -58,7 +61,7 @@ def test_a_simulation_ends_well_and_fills_its_folder(run):
 
 
 def test_the_table_fits_a_terminal_and_says_what_came_of_it(run):
-    ending = run("simulate", *CALM, "--seeds", "2", *SHORT)
+    ending = run("simulate", *CALM, "--seeds", "2", *SHORT, "--traces", "csv")
     case = sh.load_case("thesis-1975").replace({"sea.significant_height": 0.3})
     hook = HookMotion.from_case(case).displacement
     table, _, after = ending.out.partition("\nWritten to out/thesis-1975-hold: ")
@@ -81,7 +84,8 @@ def test_the_table_fits_a_terminal_and_says_what_came_of_it(run):
 
 
 def test_the_rms_of_the_table_is_that_of_the_traces(run):
-    run("simulate", *CALM, *SHORT, "--settle", "10 s", "--store-step", "10 ms", "--out", "here")
+    words = ("--settle", "10 s", "--store-step", "10 ms", "--traces", "csv", "--out", "here")
+    run("simulate", *CALM, *SHORT, *words)
     with open("here/runs/seed-000.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     payload = np.array([float(row["payload.displacement [m]"]) for row in rows])
@@ -141,9 +145,10 @@ def test_traces_come_in_other_formats(name, suffix, run):
 
 def test_an_earlier_simulation_leaves_nothing_behind(run, monkeypatch):
     monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: b"a picture")
-    run("simulate", *CALM, "--duration", "20 s", "--seeds", "3", "--out", "here")
+    words = ("--duration", "20 s", "--traces", "csv", "--out", "here")
+    run("simulate", *CALM, *words, "--seeds", "3")
     Path("here/runs/mine.csv").write_text("mine")
-    run("simulate", *CALM, "--duration", "20 s", "--no-figures", "--out", "here")
+    run("simulate", *CALM, *words, "--no-figures")
     assert sorted(p.name for p in Path("here/runs").iterdir()) == ["mine.csv", "seed-000.csv"]
     assert list(Path("here").glob("*.png")) == []
 
@@ -226,7 +231,18 @@ def test_six_motions_of_the_vessel_move_the_hook(run):
     rows = [f"{t:.1f},0,0,{np.degrees(0.01 * np.sin(0.7 * t)):.6f}" for t in clock]
     Path("ship.csv").write_text("\n".join(["time,heave,roll,pitch [deg]", *rows]))
     words = ("--hook", "ship.csv", "--tip=-30,0,20", "--out", "here")
-    run("simulate", *CALM, *SHORT, *words, "--settle", "35 s", "--store-step", "10 ms")
+    run(
+        "simulate",
+        *CALM,
+        *SHORT,
+        *words,
+        "--settle",
+        "35 s",
+        "--store-step",
+        "10 ms",
+        "--traces",
+        "csv",
+    )
     with open("here/runs/seed-000.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     heave = np.array([float(row["hook.heave [m]"]) for row in rows])
@@ -259,7 +275,8 @@ def test_the_end_of_the_stroke_is_told(run):
 
 
 def test_all_controllers_meet_in_one_table(run):
-    ending = run("simulate", *CALM, *SHORT, "--controller", "all", "--seeds", "2", "--out", "here")
+    words = ("--controller", "all", "--seeds", "2", "--traces", "csv", "--out", "here")
+    ending = run("simulate", *CALM, *SHORT, *words)
     assert ending.status == 0
     table = ending.out.partition("\nWritten to")[0]
     assert max(map(len, table.splitlines())) <= 80
@@ -454,7 +471,8 @@ def stopping(monkeypatch, after: int) -> None:
 def test_an_interrupt_between_two_runs_keeps_the_first(run, monkeypatch):
     # Asked before each run and once or more in it.
     stopping(monkeypatch, after=3)
-    ending = run("simulate", *CALM, *SHORT, "--seeds", "50", "--out", "here")
+    words = ("--seeds", "50", "--traces", "csv", "--out", "here")
+    ending = run("simulate", *CALM, *SHORT, *words)
     assert ending.status == 130
     runs = summary()["controllers"]["feedback"]["runs"]
     done = [each for each in runs if each["status"] == "completed"]
@@ -470,7 +488,7 @@ def test_an_interrupt_between_two_runs_keeps_the_first(run, monkeypatch):
 def test_an_interrupt_within_a_run_keeps_what_was_simulated_of_it(run, monkeypatch):
     stopping(monkeypatch, after=2)
     words = ("--duration", "1000 s", "--no-figures", "--settle", "10 s", "--out", "here")
-    ending = run("simulate", *CALM, *words, "--store-step", "1 s")
+    ending = run("simulate", *CALM, *words, "--store-step", "1 s", "--traces", "csv")
     assert ending.status == 130
     (only,) = summary()["controllers"]["feedback"]["runs"]
     assert only["status"] == "interrupted"
@@ -503,6 +521,7 @@ def test_an_interrupt_while_the_gains_are_sought_says_what_is_kept(run, monkeypa
 @pytest.mark.skipif(os.name != "posix", reason="signals as Unix has them")
 def test_ctrl_c_stops_in_order(tmp_path):
     words = ["simulate", *CALM, "--hours", "1", "--seeds", "9000", "--no-figures"]
+    words += ["--traces", "csv"]
     started = subprocess.Popen(
         [sys.executable, "-m", "stillhook", *words],
         cwd=tmp_path,

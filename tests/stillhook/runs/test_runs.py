@@ -386,7 +386,7 @@ def test_a_format_whose_package_is_missing_is_named(tmp_path, monkeypatch):
 
 
 def test_saved_runs_can_be_read_again(tmp_path):
-    written = sh.write_runs(tmp_path / "here", [three()], figures=False)
+    written = sh.write_runs(tmp_path / "here", [three()], format="csv", figures=False)
     assert all(path.exists() for path in written)
     with open(tmp_path / "here" / "runs" / "seed-002.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
