@@ -239,16 +239,13 @@ def test_each_kind_takes_part_once_unless_others_are_named(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("shares", "computed"), [([0.0, 0.05], False), ([0.0, 0.2], True), ([None, 90.0], False)]
+    ("share", "lost", "computed"), [(0.05, False, False), (0.2, False, True), (90.0, True, False)]
 )
-def test_there_is_no_floor_where_no_drive_is_at_its_limits(monkeypatch, shares, computed):
+def test_there_is_no_floor_where_no_drive_is_at_its_limits(monkeypatch, share, lost, computed):
     def noted(self, task, progress=None):
-        told = {"tracking error rms": 0.1, "tracking error largest": 0.3}
-        # None: at its limits all the time, and without the load.
-        share = shares[1] if task.name == "mpc" else shares[0]
-        told["saturated share"] = 90.0 if share is None else share
-        if share is None or (shares[0] is None and task.name == "mpc"):
-            told["lost lock at"] = 10.0
+        told = {"tracking error rms": 0.1, "tracking error largest": 0.3, "saturated share": 0.0}
+        if task.name == "mpc":
+            told |= {"saturated share": share} | ({"lost lock at": 10.0} if lost else {})
         return Cell(
             contender=task.name,
             height=task.height,
@@ -259,11 +256,10 @@ def test_there_is_no_floor_where_no_drive_is_at_its_limits(monkeypatch, shares, 
 
     monkeypatch.setattr(CellBench, "do", noted)
     found = sh.compare(CASE, ["feed-forward", "clairvoyant", "mpc"], jobs=1, **FAST)
-    # Where nobody holds the load, nobody can say that the floor is idle.
-    assert bool(found.of("clairvoyant", 0.5)) is (computed or shares[0] is None)
+    assert bool(found.of("clairvoyant", 0.5)) is computed
     shown = " ".join(terminal_text(comparison_report(found), width=300).split())
     reason = "clairvoyant did not take part: no drive is at its limits for over 0.1 % of the time"
-    assert (reason in shown) is not bool(found.of("clairvoyant", 0.5))
+    assert (reason in shown) is not computed
 
 
 def test_a_floor_that_is_next_to_nothing_makes_no_ratio():
@@ -609,6 +605,8 @@ def test_sensors_filter_and_plan_are_credited_apart_and_against_the_stillest_riv
     )
     told = sentences_of(worse)
     assert "combined has 2.5 (2.0 to 3.0) times the rms of feed-forward; it does not" in told[1]
+    assert "mpc-clipped has 0.22 (" in told[2]
+    assert "times the rms of feed-forward; it helps" in told[2]
     assert "filter, plan and a second sensor: mpc has 0.10" in told[4]
     assert "times the rms of feed-forward; it helps" in told[4]
 
