@@ -38,4 +38,5 @@ class ClippedMPC(LinearMPC):
         self.question = question
         move = float(self._law @ gradient)
         # What is not finite, of a forecast, falls back as a failed plan does.
-        return min(max(move, float(lower[0])), float(upper[0])) if np.isfinite(move) else None
+        self._answered = bool(np.isfinite(move))
+        return min(max(move, float(lower[0])), float(upper[0])) if self._answered else None

@@ -206,7 +206,7 @@ class WinchMPC(ABC):
     @property
     def status(self) -> str:
         """What the last step was, as `models.sensing.STATUSES` has it."""
-        if self.solved is None and self._counts["steps"]:
+        if not self._answered:
             return "fallback"
         if self.estimator.blind:
             return "blind"
@@ -241,6 +241,7 @@ class WinchMPC(ABC):
         )
         self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
         self.solved: QPSolution | None = None
+        self._answered = True  # whether the last step had its command of the programme
 
     @abstractmethod
     def step(self, measurement: Measurement, time: float) -> float:
@@ -297,7 +298,7 @@ class WinchMPC(ABC):
         self, question: tuple[FloatArray, FloatArray, FloatArray], began: float
     ) -> float | None:
         """Return the first move of the answer, None if there is none that is good."""
-        self.question, self.solved = question, None
+        self.question, self.solved, self._answered = question, None, False
         # The estimate is finite (`WinchEstimator`): it is the forecast that is not.
         if not all(math.isfinite(float(part.sum())) for part in question):
             return None
@@ -312,7 +313,7 @@ class WinchMPC(ABC):
         if clock.perf_counter() - began > self._deadline:
             self._counts["late"] += 1
             return None
-        self.solved = solved
+        self.solved, self._answered = solved, True
         soon = solved.multipliers[: self._of[self._stale - 1] + 1]
         self._plan, self._age = solved.v if soon.any() else None, 0
         return float(solved.v[0])

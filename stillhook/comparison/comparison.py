@@ -76,8 +76,8 @@ _BROKEN = {
     "tension below": "tension low",
     "tension above": "tension high",
 }
-# What a controller counts that is no command replaced: a late plan is replaced by a shifted one.
-_NO_FALLBACKS = ("steps", "iterations", "late")
+# What a controller counts that is no command replaced: of a late plan the fallback is counted.
+_NO_FALLBACKS = ("steps", "iterations", "late", "gated", "blind")
 _MEANS = {
     "significant": "payload significant",
     "largest": "tracking error largest",
