@@ -14,6 +14,8 @@ from dataclasses import KW_ONLY, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from ..basics import InputError, check_range
 from ..case import Case
 from ..casefile import Quantity, suggestion
@@ -33,6 +35,7 @@ class FaultField(Quantity):
 
 
 _LONG = 86400.0
+_SPIKES, _SPIKE = 2.0, 0.05  # from one spike to the next, and how long one lasts [s]
 
 FAULTS: Mapping[str, FaultField] = MappingProxyType(
     {
@@ -44,6 +47,9 @@ FAULTS: Mapping[str, FaultField] = MappingProxyType(
         "sensor_outage": FaultField(
             "time", 0.0, _LONG, text="how long the payload's sensor gives no numbers"
         ),
+        "stuck_readings": FaultField(
+            "time", 0.0, _LONG, text="how long the payload's sensors show the same number"
+        ),
         "mru_outage": FaultField(
             "time", 0.0, _LONG, text="how long the motion reference unit gives no numbers"
         ),
@@ -54,6 +60,9 @@ FAULTS: Mapping[str, FaultField] = MappingProxyType(
         ),
         "mru_rate_bias": FaultField(
             "speed", -100.0, 100.0, text="how much the heave rate shows too much"
+        ),
+        "mru_spike": FaultField(
+            "length", -100.0, 100.0, text="how much the heave is off for 0.05 s of every 2 s"
         ),
         "torque_limit": FaultField(
             "ratio",
@@ -72,6 +81,7 @@ FAULTS: Mapping[str, FaultField] = MappingProxyType(
 _PERIODS = {
     "telemetry_outage": "telemetry_outages",
     "sensor_outage": "sensor_failures",
+    "stuck_readings": "stuck_readings",
     "mru_outage": "mru_outages",
     "brake_trip": "brake_trips",
 }
@@ -133,6 +143,12 @@ def with_faults(
         if size["mru_heave_bias"] or size["mru_rate_bias"]:
             bias = (at, until, size["mru_heave_bias"], size["mru_rate_bias"])
             changes["mru_biases"] = (*scenario.mru_biases, bias)
+        if size["mru_spike"]:
+            spikes = [
+                (time, time + _SPIKE, size["mru_spike"], 0.0)
+                for time in np.arange(at, until, _SPIKES).tolist()
+            ]
+            changes["mru_biases"] = (*changes.get("mru_biases", scenario.mru_biases), *spikes)
         changes |= _limits(scenario, size, case, at, until)
     return replace(scenario, **changes) if changes else scenario
 

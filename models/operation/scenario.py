@@ -51,6 +51,8 @@ class Scenario:
     telemetry_outages: tuple[Interval, ...] = ()  #: Periods without messages from the payload [s].
     #: Periods with a payload sensor that gives no numbers [s].
     sensor_failures: tuple[Interval, ...] = ()
+    #: Periods in which the payload's sensors show the same for ever, as if it were true [s].
+    stuck_readings: tuple[Interval, ...] = ()
     mru_outages: tuple[Interval, ...] = ()  #: Periods without the motion reference unit [s].
     #: (start, end, extra) [s]: messages sent in the period are late by so much more.
     telemetry_delays: tuple[Late, ...] = ()
@@ -78,7 +80,13 @@ class Scenario:
         check_range(owner, "initial_haul", self.initial_haul, unit="m")
         if self.disengage_at is not None:
             check_range(owner, "disengage_at", self.disengage_at, low=self.warm_up, unit="s")
-        for name in ("brake_trips", "telemetry_outages", "sensor_failures", "mru_outages"):
+        for name in (
+            "brake_trips",
+            "telemetry_outages",
+            "sensor_failures",
+            "stuck_readings",
+            "mru_outages",
+        ):
             periods = getattr(self, name)
             checked = check_intervals(owner, name.replace("_", " "), periods, apart=True)
             object.__setattr__(self, name, checked)
@@ -120,6 +128,7 @@ class Scenario:
             ("brake", "the brake trips", self.brake_trips),
             ("telemetry", "the link from the payload is lost", self.telemetry_outages),
             ("sensor", "the payload's sensor gives no numbers", self.sensor_failures),
+            ("sensor", "the payload's sensors are stuck", self.stuck_readings),
             ("mru", "the motion reference unit gives no numbers", self.mru_outages),
         ):
             found += [(start, kind, f"{what} until {end:g} s") for start, end in periods]

@@ -67,7 +67,12 @@ def _brake_trip(_: Case, values: Values) -> dict[str, Any]:
 
 def _sensor_loss(_: Case, values: Values) -> dict[str, Any]:
     period = _failure(values)
-    which = {"telemetry": "telemetry_outages", "sensor": "sensor_failures", "mru": "mru_outages"}
+    which = {
+        "telemetry": "telemetry_outages",
+        "sensor": "sensor_failures",
+        "stuck": "stuck_readings",
+        "mru": "mru_outages",
+    }
     return {"duration": period[1] + _AFTER, which[values["lost"]]: (period,)}
 
 
@@ -138,10 +143,10 @@ _RECIPES: Mapping[str, ScenarioRecipe] = {
         ramp=10.0,
     ),
     "sensor-loss": ScenarioRecipe(
-        description="the link from the payload, its sensor or the motion reference unit is lost",
+        description="link from the payload, its sensor or the reference unit lost, or stuck",
         build=_sensor_loss,
         options={
-            "lost": WordOption(words=("telemetry", "sensor", "mru"), text="what is lost"),
+            "lost": WordOption(words=("telemetry", "sensor", "stuck", "mru"), text="what is lost"),
             "lasting": _lasting(10.0, "how long"),
             "wait": _WAIT,
         },

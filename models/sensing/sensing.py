@@ -118,7 +118,15 @@ class SensorModel:
     def row(self) -> tuple[str, ...]:
         """Names of the numbers that a sample takes from outside."""
         weights = (f"telemetry.weight.{j}" for j in self.lags)
-        return (*NOISE, *weights, "telemetry.fresh", "telemetry.age", *_MRU, *_REFERENCE)
+        return (
+            *NOISE,
+            *weights,
+            "telemetry.fresh",
+            "telemetry.valid",
+            "telemetry.age",
+            *_MRU,
+            *_REFERENCE,
+        )
 
     @staticmethod
     def raw(signals: Mapping[str, ca.SX]) -> ca.SX:
@@ -144,7 +152,7 @@ class SensorModel:
 
         The references are displacement, velocity and acceleration asked of the payload (n, 3).
         """
-        link = (telemetry.weights, telemetry.fresh, telemetry.age)
+        link = (telemetry.weights, telemetry.fresh, telemetry.valid, telemetry.age)
         return np.column_stack((noise, *link, mru.heave, mru.heave_rate, mru.valid, references))
 
     def initial(self, raw: npt.ArrayLike) -> FloatArray:
@@ -180,7 +188,7 @@ class SensorModel:
         after: dict[str, ca.SX] = {}
         seen: dict[str, ca.SX] = {
             "payload.age": given["telemetry.age"],
-            "payload.valid": given["telemetry.fresh"],
+            "payload.valid": given["telemetry.valid"],
             "motor.torque": plant["motor.torque"],
             "drive.applied": applied,
             **{name: given[name] for name in (*_MRU, *_REFERENCE)},

@@ -43,6 +43,7 @@ class TelemetryBlock(ReadOnlyArrays):
     weights: FloatArray
     #: 1 where something new and usable has arrived since the sample before, else 0 (count,).
     fresh: FloatArray
+    valid: FloatArray  #: 1 where it is said that this is so, else 0 (count,).
     age: FloatArray  #: Time since what is known last was true [s], (count,).
 
 
@@ -74,6 +75,8 @@ class TelemetrySchedule:
     outages: Sequence[Interval] = ()  #: Intervals (start, end) [s] in which nothing is sent.
     #: Intervals in which the messages come, but are marked as invalid.
     broken: Sequence[Interval] = ()
+    #: Intervals in which the messages that come tell what the last one before them did.
+    stuck: Sequence[Interval] = ()
     #: (start, end, extra) [s]: messages sent in the interval are late by so much more.
     late: Sequence[Late] = ()
 
@@ -96,6 +99,8 @@ class TelemetrySchedule:
         fresh = known[1:] > known[:-1]
         age = start + np.arange(count) - known[1:]
         weights = np.zeros((count, len(self.lags)))
+        valid = fresh
+        fresh = fresh & ~during(self.stuck, start + np.arange(count), self.sample_time)
         row = np.flatnonzero(fresh)
         whole = np.floor(age[row]).astype(np.int64)
         share = age[row] - whole
@@ -105,6 +110,7 @@ class TelemetrySchedule:
         return TelemetryBlock(
             weights=weights,
             fresh=fresh.astype(np.float64),
+            valid=valid.astype(np.float64),
             age=np.asarray(age * self.sample_time, dtype=np.float64),
         )
 

@@ -42,7 +42,7 @@ _OWN = (
 _NEVER = 1e12  # a speed that no motor reaches [rad/s]
 _FROM_ROW = {
     "payload.age": "telemetry.age",
-    "payload.valid": "telemetry.fresh",
+    "payload.valid": "telemetry.valid",
     "reference.displacement": "reference.displacement",
 }
 _UNITS = {

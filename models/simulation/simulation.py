@@ -163,6 +163,7 @@ class Simulation:
                 seed,
                 outages=scenario.telemetry_outages,
                 broken=scenario.sensor_failures,
+                stuck=scenario.stuck_readings,
                 late=scenario.telemetry_delays,
             ),
             mru=MruModel(

@@ -233,6 +233,7 @@ def stays(scenario: Scenario) -> bool:
         or scenario.worst_trip is not None
         or scenario.telemetry_outages
         or scenario.sensor_failures
+        or scenario.stuck_readings
         or scenario.mru_outages
         or scenario.telemetry_delays
         or scenario.mru_biases

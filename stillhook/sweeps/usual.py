@@ -41,6 +41,8 @@ FAULT_SPREADS: Mapping[str, Mapping[str, Distribution]] = MappingProxyType(
             "sensors.telemetry.dropout_length": Uniform(0.0, 1.0),
         },
         "outages": {"fault.telemetry_outage": Uniform(0.0, 20.0)},
+        "stuck": {"fault.stuck_readings": Uniform(0.0, 60.0)},
+        "spikes": {"fault.mru_spike": Uniform(-3.0, 3.0)},
         "delay-jumps": {
             "fault.delay_step": Uniform(0.0, 0.3),
             "fault.lasting": Uniform(10.0, 120.0),
@@ -61,9 +63,10 @@ FAULT_SPREADS: Mapping[str, Mapping[str, Distribution]] = MappingProxyType(
     }
 )
 """What fails, by name, and how far: up to half of the messages lost, in runs of up to a second; no
-message for up to 20 s; messages up to 0.3 s later for a while; payload sensors that show 5 mg, 2
-cm/s or 10 cm too much; a reference unit that shows 20 cm or 5 cm/s too much for a minute; a drive
-with half of its torque or a third of its power for a minute."""
+message for up to 20 s; payload sensors that stand still for up to a minute, and a heave that is off
+by up to 3 m for 0.05 s of every 2 s; messages up to 0.3 s later for a while; payload sensors that
+show 5 mg, 2 cm/s or 10 cm too much; a reference unit that shows 20 cm or 5 cm/s too much for a
+minute; a drive with half of its torque or a third of its power for a minute."""
 
 
 def fault_spread(*names: str) -> Spread:

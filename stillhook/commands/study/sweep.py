@@ -64,8 +64,8 @@ ARGUMENTS = (
         --spread FILE  a spread file (.yaml)
         --vary PATH=RANGE ...  vary a number evenly, as in payload.mass=30%% (either way) or
             'delay=20 ms..80 ms'; adds to --spread
-        --faults A,B,..  vary what fails, with --mode time: dropouts, outages, delay-jumps,
-            sensor-bias, mru-bias, limit-cuts
+        --faults A,B,..  vary what fails, with --mode time: dropouts, outages, stuck,
+            spikes, delay-jumps, sensor-bias, mru-bias, limit-cuts
         --samples N  number of cases (default: 10000; with --mode time 256)
         --sampling METHOD [sobol]  sobol (default), lhs, random, grid, corners or given
         --seed N [0]  seed of the draws

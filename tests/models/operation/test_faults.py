@@ -96,6 +96,7 @@ def test_nothing_fails_where_nothing_is_asked():
 
 def test_every_fault_becomes_part_of_the_scenario():
     sizes = {"at": 10.0, "lasting": 20.0, "telemetry_outage": 3.0, "sensor_outage": 4.0}
+    sizes |= {"stuck_readings": 2.0, "mru_spike": 1.5}
     sizes |= {"mru_outage": 5.0, "brake_trip": 6.0, "delay_step": 0.1}
     sizes |= {"mru_heave_bias": 0.2, "mru_rate_bias": -0.1, "torque_limit": 0.6, "power_limit": 0.5}
     assert set(sizes) == set(FAULTS)
@@ -105,7 +106,11 @@ def test_every_fault_becomes_part_of_the_scenario():
     assert found.mru_outages == ((10.0, 15.0),)
     assert found.brake_trips == ((10.0, 16.0),)
     assert found.telemetry_delays == ((10.0, 30.0, 0.1),)
-    assert found.mru_biases == ((10.0, 30.0, 0.2, -0.1),)
+    assert found.stuck_readings == ((10.0, 12.0),)
+    bias, *spikes = found.mru_biases
+    assert bias == (10.0, 30.0, 0.2, -0.1)
+    assert [spike[0] for spike in spikes] == [10.0 + 2.0 * k for k in range(10)]
+    assert {spike[2:] for spike in spikes} == {(1.5, 0.0)}
     cut, back = found.parameter_changes[10.0], found.parameter_changes[30.0]
     assert cut["drive.torque_limit"] == 0.6 * CASE.winch.drive.torque_peak
     assert cut["drive.power_limit"] == 0.5 * CASE.winch.power_limit

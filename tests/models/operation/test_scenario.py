@@ -358,11 +358,13 @@ class TestLibrary:
         for lost, field in (
             ("telemetry", "telemetry_outages"),
             ("sensor", "sensor_failures"),
+            ("stuck", "stuck_readings"),
             ("mru", "mru_outages"),
         ):
             found = scenario_named("sensor-loss", crane, lost=lost, lasting="3 s", wait=50)
             assert getattr(found, field) == ((50.0, 53.0),)
-        with pytest.raises(InputError, match="lost must be one of telemetry, sensor, mru, got 'x'"):
+        told = "lost must be one of telemetry, sensor, stuck, mru, got 'x'"
+        with pytest.raises(InputError, match=told):
             scenario_named("sensor-loss", crane, lost="x")
 
     def test_the_brake_trips_at_the_worst_moment_or_at_a_stated_one(self, crane):

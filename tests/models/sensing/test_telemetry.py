@@ -125,6 +125,15 @@ class TestSchedule:
         latest = schedule.telemetry.delay + schedule.telemetry.jitter + TS
         assert block.age[block.fresh == 1.0].max(initial=0.0) <= latest
 
+    def test_what_is_stuck_is_held_and_said_to_be_fresh(self):
+        link = TelemetrySchedule(Telemetry(delay=0.03), TS, 1, stuck=((1.0, 2.0),))
+        block, usual = link.block(0, 400), TelemetrySchedule(Telemetry(delay=0.03), TS, 1)
+        stuck = (np.arange(400) >= 50) & (np.arange(400) < 100)
+        assert block.valid.all()
+        assert np.array_equal(block.fresh == 0.0, stuck)
+        assert not block.weights[stuck].any()
+        assert np.array_equal(block.age, usual.block(0, 400).age)
+
     @given(schedules)
     def test_age_is_time_minus_the_time_of_the_content(self, schedule):
         block = schedule.block(0, 600)

@@ -469,6 +469,28 @@ def test_a_lost_link_is_held_and_shown() -> None:
     assert run.completed
 
 
+def test_readings_that_are_stuck_are_said_to_be_valid() -> None:
+    case = crane()
+    controller, heard = InPython(feedback(case, CRANE, 0.02)), []
+    step = controller.step
+
+    def listening(measurement: Measurement, time: float) -> float:
+        heard.append(measurement.values.copy())
+        return step(measurement, time)
+
+    controller.step = listening  # type: ignore[method-assign]
+    stuck = Scenario(name="stuck", description="", duration=40.0, stuck_readings=((20.0, 30.0),))
+    simulate(case, controller, scenario=stuck)
+    values = np.array(heard)
+    assert (values[50:, HEARD.index("payload.valid")] == 1.0).all()
+    assert len(set(values[50:, HEARD.index("payload.age")].round(9))) == 1
+    for name in ("payload.acceleration", "payload.velocity", "payload.displacement"):
+        seen = values[:, HEARD.index(name)]
+        assert len(set(seen[1000:1500])) == 1
+        assert seen[1000] == seen[999]
+        assert len(set(seen[1500:])) > 490
+
+
 @pytest.mark.ci
 def test_a_day_needs_little_memory() -> None:
     case = thesis()
