@@ -14,7 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import math
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 import comparison
@@ -25,6 +25,7 @@ from stored import DOCS, read_rows
 import stillhook as sh
 from models import PhysicsWarning
 from models.basics import FloatArray
+from models.plant import MEASUREMENTS
 from models.sensing import HEARD, Measurement
 from mpc.forecast import AdaptiveAR
 from mpc.linear import path_of_sea
@@ -68,23 +69,42 @@ def mpc(case: sh.Case, **options: object) -> sh.LinearMPC:
 
 
 class Deaf:
-    """A controller that hears nothing from some sensors for a minute out of two."""
+    """A controller that some sensors tell nothing, or nothing true, for a minute out of two.
 
-    def __init__(self, own: sh.LinearMPC, *lost: str) -> None:
+    What is lost shows no number or is said not to be valid, what stands shows what it showed at
+    the beginning of the minute, and what jumps is off by so much in one sample of five.
+    """
+
+    def __init__(
+        self,
+        own: sh.LinearMPC,
+        *lost: str,
+        stands: Sequence[str] = (),
+        jumps: Mapping[str, float] | None = None,
+    ) -> None:
         self.name, self.sample_time, self._own, self._lost = "deaf", own.sample_time, own, lost
+        self._stands = [HEARD.index(name) for name in stands]
+        self._jumps = {HEARD.index(name): by for name, by in (jumps or {}).items()}
+        self._before, self._samples = np.zeros(len(HEARD)), 0
 
     def reset(self) -> None:
         """Forget."""
         self._own.reset()
+        self._samples = 0
 
     def step(self, measurement: Measurement, time: float) -> float:
         """Do as always with what is left."""
-        if gone(time):
-            shown = measurement.values.copy()
-            for name in self._lost:
-                shown[HEARD.index(name)] = 0.0 if name.endswith(".valid") else math.nan
-            measurement = Measurement(shown)
-        return self._own.step(measurement, time)
+        self._samples += 1
+        if not gone(time):
+            self._before = measurement.values.copy()
+            return self._own.step(measurement, time)
+        shown = measurement.values.copy()
+        for name in self._lost:
+            shown[HEARD.index(name)] = 0.0 if name.endswith(".valid") else math.nan
+        shown[self._stands] = self._before[self._stands]
+        for at, by in self._jumps.items():
+            shown[at] += by if self._samples % 5 == 0 else 0.0
+        return self._own.step(Measurement(shown), time)
 
 
 def gone(time: float | FloatArray) -> bool | FloatArray:
@@ -117,6 +137,10 @@ def outages(effort: Effort) -> dict[str, float]:
         "cell": lost(Deaf(own, cell)),
         "both": lost(Deaf(own, telegram, cell)),
         "forward": lost(sh.VelocityFeedForward(case, share=1.0)),
+        "stuck": lost(Deaf(own, stands=MEASUREMENTS)),
+        "held_cell": lost(Deaf(own, stands=("rope.tension",))),
+        "heave": lost(Deaf(own, jumps={"mru.heave": 3.0})),
+        "depth": lost(Deaf(own, jumps={"payload.displacement": 5.0})),
     }
 
 
@@ -409,7 +433,9 @@ SAYINGS = [
             On `subsea-crane` a minute without telemetry leaves {telegram:2} mm, one without
             reference unit {unit:2}, without load cell {cell:2}, without telemetry and load cell
             {both:2}, where {none:2} mm are left with all of them and feed-forward leaves
-            {forward:2}.
+            {forward:2}. Payload sensors that stand still leave {stuck:2} mm, a load cell that does
+            {held_cell:2}, a heave that is 3 m off in one sample of five {heave:2}, and a depth that
+            is 5 m off {depth:2}.
         """,
         work=outages,
     ),
