@@ -100,9 +100,11 @@ class Measurement:
 class Controller(Protocol):
     """Anything that makes drive commands out of measurements.
 
-    Three attributes are optional: `recursion`, a `Recursion` that does what `step` does, lets
+    Four attributes are optional: `recursion`, a `Recursion` that does what `step` does, lets
     the whole loop be compiled; `brake`, true for a controller that holds the drum with its
-    brake instead of its motor; `status`, one of `STATUSES`, says what the last step was.
+    brake instead of its motor; `status`, one of `STATUSES`, says what the last step was;
+    `masses`, the masses along the rope on which it was found to hold, of which a simulation then
+    has as many.
     """
 
     @property

@@ -25,6 +25,7 @@ from ..plant import (
     DrumTravel,
     OperatingPoint,
     Plant,
+    PlantData,
     Surroundings,
     build_plant,
 )
@@ -57,7 +58,8 @@ class SimulationOptions:
     duration: float | None = None  #: Length of a run [s]; by default the scenario's own.
     #: Integration step [s]; by default the longest that the plant's fastest mode allows.
     step: float | None = None
-    masses: int | None = None  #: Masses along the rope; by default those of the case.
+    #: Masses along the rope; by default those of the case, or of the controller's design if more.
+    masses: int | None = None
     #: Limits of the drive; by default those of the case, `DriveLimits()` for none.
     limits: DriveLimits | None = None
     #: Values of plant parameters by name, such as ``{"payload.quadratic_drag": 0.0}``.
@@ -253,6 +255,11 @@ def prepare(
     )
     limits = DriveLimits.from_case(case) if options.limits is None else options.limits
     masses = options.masses
+    if masses is None:
+        # A loop that reaches the rope's higher modes holds where these are, and few masses have
+        # them elsewhere.
+        data, least = PlantData.from_case(case), int(getattr(controller, "masses", 0))
+        masses = least if data.masses is None and least > data.chosen_masses() else None
     surroundings = scenario.surroundings
     farthest = max((abs(move.distance) for move in scenario.profile.moves), default=0.0)
     travels = max(farthest, abs(scenario.initial_haul)) > _TRAVELS

@@ -80,6 +80,8 @@ class LinearFeedback(RecursiveController):
         the telemetry's delay.
     name
         What it is called; by default ``feedback``.
+    masses
+        Masses along the rope on which the law was found to hold: a simulation has at least as many.
 
     Raises
     ------
@@ -96,6 +98,7 @@ class LinearFeedback(RecursiveController):
     anti_windup: bool
     hold_for: float
     motor: SteadyMotion
+    masses: int
 
     def __init__(
         self,
@@ -106,6 +109,7 @@ class LinearFeedback(RecursiveController):
         anti_windup: bool = True,
         hold_for: float | None = None,
         name: str = "feedback",
+        masses: int = 0,
     ) -> None:
         checked_sample_time(_OWNER, sample_time)
         plant = build_plant(case)
@@ -121,6 +125,7 @@ class LinearFeedback(RecursiveController):
             anti_windup=anti_windup and len(C[0]) > 0,
             hold_for=float(hold),
             motor=SteadyMotion.of(plant.data),
+            masses=masses,
         )
         back = tracking_gain(C, sample_time) if self.anti_windup else np.zeros((len(C[0]), 1))
         static = {"rope.tension": point.tension, "motor.torque": point.torque}
@@ -163,13 +168,14 @@ class LinearFeedback(RecursiveController):
             If a `Tuning` comes without a case or has no controller; otherwise as the class.
         """
         law = design.controller
+        masses = design.masses if isinstance(design, Design) else 0
         if law is None:
             raise InputError(f"{_OWNER}: the design has no controller: {design.status}")
         if case is None and isinstance(design, Design):
             case = design.case
         if case is None:
             raise InputError(f"{_OWNER}: a Tuning does not know its case: say case=...")
-        return cls(case, law, **options)
+        return cls(case, law, **{"masses": masses, **options})
 
     @property
     def dynamic(self) -> bool:

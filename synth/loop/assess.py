@@ -674,7 +674,8 @@ def consistent_coefficients(
             return -1.0
 
         if surplus(_LEAST) > 0.0:
-            surplus(float(brentq(surplus, _LEAST, 0.0, xtol=1e-10)))
+            if surplus(0.0) < 0.0:
+                surplus(float(brentq(surplus, _LEAST, 0.0, xtol=1e-10)))
         elif drag is None:
             return (0.0,) * len(losses)  # it moves without end, and losses count for nothing
     if swings(found):

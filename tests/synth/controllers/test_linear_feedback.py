@@ -14,8 +14,9 @@ from linear_runs import linear_run, still
 from sampled_response import sampled_response
 
 from models.basics import InputError, SynthesisError
-from models.plant import MEAN_LOSSES, build_plant
+from models.plant import MEAN_LOSSES, PlantData, build_plant
 from models.sensing import Measurement
+from models.simulation import SimulationOptions, prepare
 from synth import LowOrder, MaxSensitivity, White, evaluate_gains, tune
 from synth.controllers import LinearFeedback
 from synth.loop import LinearController
@@ -333,3 +334,33 @@ def test_a_design_without_a_controller_is_told() -> None:
 
     with pytest.raises(InputError, match="has no controller: no stable design was found"):
         LinearFeedback.from_design(Nothing(), case=load_case("thesis-1975"))
+
+
+_SOME = {"A": 1.0, "a": 0.1, "a1": 0.1, "a2": 0.1}
+
+
+def test_a_design_is_simulated_on_as_many_masses_as_it_was_found_to_hold_on():
+    """With gains that reach its higher modes the coarser rope swings where the rope does not."""
+    case = load_case("thesis-1975-rope")
+    ropes = {}
+    for masses in (0, 3, 33):
+        controller = LinearFeedback(case, _SOME, masses=masses)
+        for asked in (None, 6):
+            loop = prepare(case, controller, options=SimulationOptions(masses=asked)).loop
+            states = [name for name in loop.states if name.startswith("plant.rope.")]
+            ropes[masses, asked] = sum(name.endswith("velocity") for name in states)
+    usual = ropes[0, None]
+    assert ropes[33, None] - usual == 33 - PlantData.from_case(case).chosen_masses()
+    assert ropes[3, None] == usual
+    assert ropes[0, 6] == ropes[33, 6] == ropes[3, 6]
+    told = case.replace({"rope.masses": 5})
+    loop = prepare(told, LinearFeedback(told, _SOME, masses=33)).loop
+    assert sum(n.startswith("plant.rope.") and n.endswith("velocity") for n in loop.states) == 4
+
+
+def test_the_feedback_of_a_design_knows_its_masses():
+    case = load_case("thesis-1975-rope")
+    design = evaluate_gains(case, case.gains)
+    assert design.masses > 1
+    assert LinearFeedback.from_design(design).masses == design.masses
+    assert LinearFeedback.from_design(design, masses=0).masses == 0
