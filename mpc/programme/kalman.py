@@ -85,7 +85,8 @@ class ChangingGains:
     ) -> None:
         # Each state in its own size, each output in units of its own error.
         self._A = np.ascontiguousarray(A / scale[:, None] * scale)
-        self._C = np.ascontiguousarray(C * scale / np.sqrt(R)[:, None])
+        self._unit = scale / np.sqrt(R)[:, None]
+        self._C = np.ascontiguousarray(C * self._unit)
         self._Q = Q / np.outer(scale, scale)
         self._back = scale[:, None] / np.sqrt(R)
         self._outer = np.outer(scale, scale)
@@ -124,15 +125,19 @@ class ChangingGains:
             self._spread = self._R * (1.0 + np.sum((self._C @ self._P) * self._C, axis=1))
         return self._spread
 
-    def at(self, there: npt.NDArray[np.bool_]) -> FloatArray:
-        """Return the gain of a sample at which some signals are there, (n, ny), and go on."""
-        key = there.tobytes()
+    def at(self, there: npt.NDArray[np.bool_], C: FloatArray | None = None) -> FloatArray:
+        """Return the gain of a sample at which some signals are there, (n, ny), and go on.
+
+        Where they tell of something else than usual, C (ny, n) says of what.
+        """
+        key = there.tobytes() if C is None else b""
         if key != self._there:
             self._there, self._held = key, None
             self._samples = 0
         if self._held is not None:
             return self._held
-        P, C, self._spread = self._P, self._C, None
+        P, self._spread = self._P, None
+        C = self._C if C is None else C * self._unit
         gain = kalman_gain(C, self._one, P, there)
         self._samples += 1
         if self._samples % _LOOKED == 0 and key in self._steady:

@@ -61,6 +61,10 @@ class WinchEstimator:
         delays = ages(model.winch)
         self._usual = model.winch.data.delay
         self._own = {name: delays[name] - self._usual for name in MEASUREMENTS}
+        # What is older than what is remembered has nothing to be compared with.
+        self._oldest = _LATER * model.winch.sample_time + min(
+            model.depth[name] * model.winch.sample_time - self._own[name] for name in MEASUREMENTS
+        )
         self._slack = _LATER * model.winch.sample_time
         # All is counted from rest, where the rope already carries the load.
         self._rest = np.zeros(len(MEASURED))
@@ -138,11 +142,12 @@ class WinchEstimator:
         # that says "not valid" takes a signal out before its number is looked at.
         age, reading = float(shown[_AGE]), shown[_AT]
         age = age if math.isfinite(age) else self._usual
-        expected = self._late(age) @ ahead + self._rest
+        rows = self._late(age)
+        expected = rows @ ahead + self._rest
         error = reading - expected
         error -= self._felt * winch.extra_drag(float(self._velocity @ ahead))
         there = np.abs(error) < _HUGE
-        if not shown[_FRESH] > 0.5:
+        if not shown[_FRESH] > 0.5 or age > self._oldest:
             there[_TELEMETRY] = False
         if shown[_UNIT] <= 0.5:
             there[_REFERENCE] = False
@@ -153,8 +158,9 @@ class WinchEstimator:
         self.gated = bool((there > believed).any())
         there = believed
         self._unheard = 0 if there[_TELEMETRY].any() else self._unheard + 1
-        if not there.all():
-            gain, error = self._gains.at(there), np.where(there, error, 0.0)
+        if rows is not self._C or not there.all():
+            gain = self._gains.at(there, None if rows is self._C else rows)
+            error = np.where(there, error, 0.0)
         elif self._samples < len(self._first):
             gain = self._first[self._samples]
             self._samples += 1

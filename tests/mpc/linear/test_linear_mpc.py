@@ -541,6 +541,17 @@ def test_a_deadline_that_is_missed_is_counted_and_the_drive_has_its_command():
     assert run.completed
 
 
+@pytest.mark.parametrize("extra", [0.02, 0.08, 0.3])
+def test_telegrams_that_become_later_do_not_lose_the_load(extra):
+    """The gain for telegrams of the usual age lost it, by 50 m; what is older than is remembered
+    is not heard at all."""
+    controller = LinearMPC(CRANE)
+    late = replace(scenario_named("hold", CRANE), telemetry_delays=((50.0, 90.0, extra),))
+    runs = sh.simulate(CRANE, controller, scenario=late, seeds=[1], duration=110.0, settle=50.0)
+    assert runs[0].statistics.value("tracking error rms") < 0.05
+    assert ("blind" in runs[0].timings.statuses) == (extra == 0.3)
+
+
 def test_a_run_tells_how_long_its_controller_was_blind():
     controller = LinearMPC(CRANE, weights=WEIGHTS["subsea-crane"])
     runs = sh.simulate(
