@@ -4,11 +4,9 @@ Behind :mod:`models.basics.quadrature`: log-frequency, optionally continued to z
 cut at kinks and refined towards poles.
 """
 
-import cmath
 import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +14,7 @@ import numpy.typing as npt
 from .arrays import ComplexArray, FloatArray
 from .checks import InputError, check_range
 
-_HEAP = 0.03  # how far apart on the axis poles may be that count as one cut
+_STRAIGHT = 1e6j  # a pole so far off that a rule about it is as good as one about none
 
 
 class FrequencyAxis:
@@ -39,14 +37,14 @@ class FrequencyAxis:
         """Where the axis begins, changes its map and ends."""
         return (-1.0, 0.0, self.end, self.end + 1.0) if self.half_line else (0.0, self.end)
 
-    def cut(self, omega: complex) -> complex:
-        """Return t at a (complex) frequency."""
-        size = abs(omega)
-        if self.half_line and size < self.low:
-            return omega / self.low - 1.0
-        if self.half_line and size > self.high:
-            return self.end + 1.0 - self.high / omega
-        return cmath.log(omega / self.low)
+    def cut(self, omega: ComplexArray) -> ComplexArray:
+        """Return t at (complex) frequencies."""
+        found = np.log(omega / self.low)
+        if self.half_line:
+            size = np.abs(omega)
+            found = np.where(size < self.low, omega / self.low - 1.0, found)
+            found = np.where(size > self.high, self.end + 1.0 - self.high / omega, found)
+        return np.asarray(found, dtype=np.complex128)
 
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the frequencies [rad/s] of points of panels, (p, n), and slopes d omega/dt."""
@@ -62,11 +60,15 @@ class FrequencyAxis:
         return omega, slope
 
     def rules(
-        self, panels: Sequence[tuple[float, float]] | FloatArray, counts: npt.ArrayLike
+        self,
+        panels: Sequence[tuple[float, float]] | FloatArray,
+        counts: npt.ArrayLike,
+        about: ComplexArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return nodes and weights [rad/s] of panels one after the other, with so many nodes each.
 
-        `counts` is one number for all panels, or one for each.
+        `counts` is one number for all panels, or one for each; panels are of t,
+        or of u where it is t = c + d sinh(u), `about` c + i d for each.
         """
         a, b = np.array(panels, dtype=np.float64).reshape(-1, 2).T[:, :, None]
         lengths = np.broadcast_to(counts, len(a))
@@ -75,65 +77,44 @@ class FrequencyAxis:
         for count in np.unique(lengths):
             own = np.flatnonzero(lengths == count)
             x, w = _gauss_legendre(int(count))
-            at, slope = self.at(0.5 * (a[own] + b[own]) + 0.5 * (b[own] - a[own]) * x)
+            half = 0.5 * (b[own] - a[own])
+            t, w = 0.5 * (a[own] + b[own]) + half * x, half * w
+            if about is not None:
+                c, d = about[own, None].real, about[own, None].imag
+                t, w = c + d * np.sinh(t), w * d * np.cosh(t)
+            at, slope = self.at(t)
             places = first[own, None] + np.arange(count)
-            omega[places], weights[places] = at, 0.5 * (b[own] - a[own]) * w * slope
+            omega[places], weights[places] = at, w * slope
         return omega, weights
 
-    def poles(self, poles: Iterable[complex]) -> list[complex]:
+    def poles(self, poles: Iterable[complex]) -> ComplexArray:
         """Return poles s as points t with a positive imaginary part."""
-        marks = []
-        for pole in poles:
-            s = complex(pole)
-            if s == 0.0:
-                continue
-            if s.real == 0.0 or not math.isfinite(abs(s)):
-                raise InputError(
-                    "quadrature: poles must be finite and off the imaginary axis, or the "
-                    f"integral diverges; got {s:.6g} rad/s"
-                )
-            marks.append(self.cut(complex(abs(s.imag), abs(s.real))))
-        return marks
+        every = np.array([complex(pole) for pole in poles], dtype=np.complex128)
+        every = every[every != 0.0]
+        for s in every[(every.real == 0.0) | ~np.isfinite(every)]:
+            raise InputError(
+                "quadrature: poles must be finite and off the imaginary axis, or the "
+                f"integral diverges; got {s:.6g} rad/s"
+            )
+        return self.cut(np.abs(every.imag) + 1j * np.abs(every.real))
 
 
 def cut_panels(
     axis: FrequencyAxis,
     splits: Iterable[float],
-    marks: Sequence[complex],
+    marks: ComplexArray,
     longest: float,
     clearance: float,
 ) -> list[tuple[float, float]]:
-    """Cut the axis into panels: at the splits, at most `longest`, and short near the poles.
+    """Cut the axis into panels: at splits and poles, at most `longest`, and short near the poles.
 
-    A panel's half-length is at most `clearance` times its distance from each pole.  Of poles in a
-    heap far from the axis, such as the real ones of a rope's many pieces, one makes a cut.
+    A panel's half-length is at most `clearance` times its distance from each pole.
     """
-    first, last = axis.edges[0], axis.edges[-1]
-    far = sorted(p.real for p in marks if 0.5 * longest <= clearance * p.imag)
-    near = [p for p in marks if 0.5 * longest > clearance * p.imag]
-    cuts = {*axis.edges, *(p.real for p in near)}
-    heap = -math.inf
-    for t in far:
-        if t - heap > _HEAP:
-            heap = t
-            cuts.add(t)
-    for omega in splits:
-        value = check_range("quadrature", "splits", omega, low=0.0, unit="rad/s")
-        if value > 0.0:
-            cuts.add(axis.cut(complex(value)).real)
-    inside: list[float] = []
-    for t in sorted(c for c in cuts if first <= c <= last):
-        # Two cuts closer than rounding would only make an empty panel; the axis's own stay.
-        if not inside or t - inside[-1] > 1e-10 or t in axis.edges:
-            inside.append(t)
-    stack = []
-    for a, b in pairwise(inside):
-        edges = np.linspace(a, b, math.ceil((b - a) / longest) + 1)
-        stack += [(float(x), float(y)) for x, y in pairwise(edges)]
-    done, panels = [], np.array(stack).reshape(-1, 2)
+    near = marks[0.5 * longest > clearance * marks.imag]
+    done, panels = [], _at_most(longest, axis, splits, marks.real)
     while len(panels):
         half = 0.5 * (panels[:, 1] - panels[:, 0])
-        away = distance(panels[:, :1], panels[:, 1:], np.array(near, dtype=np.complex128))
+        away = _distance(panels, near)
         long = half > clearance * away.min(axis=1, initial=np.inf) * (1 + 1e-9)
         done += [(float(a), float(b)) for a, b in panels[~long]]
         middle = panels[long].mean(axis=1)
@@ -143,9 +124,53 @@ def cut_panels(
     return sorted(done)
 
 
-def distance(a: npt.ArrayLike, b: npt.ArrayLike, mark: ComplexArray) -> FloatArray:
-    """Return how far points of the complex t plane lie from the panels [a, b]."""
-    beside = np.maximum(np.maximum(np.asarray(a) - mark.real, mark.real - np.asarray(b)), 0.0)
+def stretched_panels(
+    axis: FrequencyAxis, splits: Iterable[float], marks: ComplexArray, longest: float
+) -> tuple[FloatArray, ComplexArray, FloatArray]:
+    """Cut the axis into panels, (p, 2), at most `longest`, at the splits and between the poles.
+
+    They are of u, see `FrequencyAxis.rules`, in which the pole that each is about lies at i pi/2.
+    Also return these poles, and how far any is then off, in half-lengths, (p,).  What is smooth is
+    as if it had a pole at half the longest panel.
+    """
+    marks = np.unique(marks[marks.imag < 0.5 * longest])
+    lone = np.zeros(0, np.complex128)
+    for mark in marks[np.argsort(marks.imag)]:
+        # Stretched about a narrow one, wider ones near it are as far off as it is.
+        if np.all(np.abs(mark.real - lone.real) > mark.imag):
+            lone = np.append(lone, mark)
+    places = np.sort(lone.real)
+    thirds = np.diff(places) / 3.0
+    panels = _at_most(longest, axis, splits, [*(places[:-1] + thirds), *(places[1:] - thirds)])
+    half = 0.5 * (panels[:, 1:] - panels[:, :1])
+    away = np.column_stack([half, _distance(panels, lone)])
+    about = np.append(_STRAIGHT, lone)[away.argmin(axis=1)]
+    smooth = panels.mean(axis=1) + 0.5j * longest
+    every = np.column_stack([np.broadcast_to(marks, (len(panels), marks.size)), smooth])
+    c, d = about[:, None].real, about[:, None].imag
+    ends = np.arcsinh((panels - c) / d)
+    away = _distance(ends, np.arcsinh((every - c) / d))
+    return ends, about, away.min(axis=1) / (0.5 * (ends[:, 1] - ends[:, 0]))
+
+
+def _at_most(
+    longest: float, axis: FrequencyAxis, splits: Iterable[float], cuts: list[float] | FloatArray
+) -> FloatArray:
+    """Return panels of a length at most, (p, 2), that end at the splits and at other cuts."""
+    kinks = [check_range("quadrature", "splits", omega, low=0.0, unit="rad/s") for omega in splits]
+    places = axis.cut(np.array([omega for omega in kinks if omega > 0.0], dtype=np.complex128)).real
+    first, *_, last = axis.edges
+    every = np.unique(np.concatenate([axis.edges, cuts, places]).clip(first, last))
+    # Two cuts closer than rounding would only make an empty panel; the axis's own stay.
+    ends = every[(np.diff(every, prepend=-np.inf) > 1e-10) | np.isin(every, axis.edges)]
+    count = np.cumsum([0.0, *np.ceil(np.diff(ends) / longest)])
+    edges = np.interp(np.arange(count[-1] + 1), count, ends)
+    return np.column_stack([edges[:-1], edges[1:]])
+
+
+def _distance(panels: FloatArray, mark: ComplexArray) -> FloatArray:
+    """Return how far points of the complex t plane, (m,) or (p, m), lie from panels, (p, 2)."""
+    beside = np.maximum(np.maximum(panels[:, :1] - mark.real, mark.real - panels[:, 1:]), 0.0)
     return np.asarray(np.hypot(beside, mark.imag))
 
 

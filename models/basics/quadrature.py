@@ -6,11 +6,12 @@ that everything behind it works on plain arrays of nodes.
 
 The nodes are Gauss-Legendre on panels in log-frequency, because the features of a response are
 about equally wide on that axis wherever they lie.  A panel ends wherever the integrand has a
-kink (the peak of a JONSWAP spectrum, the rows of a RAO table), and panels shrink geometrically
-towards a lightly damped pole: an n-point rule converges like :math:`\rho^{-2n}`, with
-:math:`\rho` the size of the ellipse around the panel that stays clear of the pole (Trefethen,
-*Approximation Theory and Approximation Practice*, 2013, ch. 19), so a panel whose half-length is
-at most its distance from the pole has :math:`\rho \ge 1 + \sqrt 2`.
+kink (the peak of a JONSWAP spectrum, the rows of a RAO table).  An n-point rule converges like
+:math:`\rho^{-2n}`, with :math:`\rho` the size of the ellipse around the panel that stays clear of
+all poles (Trefethen, *Approximation Theory and Approximation Practice*, 2013, ch. 19): a panel
+whose half-length is at most its distance from them has :math:`\rho \ge 1 + \sqrt 2`.  About a
+lightly damped pole c + i d the rule is one in u, t = c + d sinh u, which puts the pole at i pi/2
+and a panel of many widths on a few units of u.
 
 Two ways to get nodes: :func:`spectral_nodes` from what is known of the integrand (kinks and
 poles), and :func:`adaptive_nodes` from the integrands themselves, several at once.  The second is
@@ -29,7 +30,7 @@ import numpy.typing as npt
 
 from .arrays import FloatArray
 from .checks import InputError, ReadOnlyArrays, SolverError, check_finite, check_range
-from .panels import FrequencyAxis, cut_panels, distance, longest_panel
+from .panels import FrequencyAxis, cut_panels, longest_panel, stretched_panels
 
 # Rules that the adaptive scheme tries on a panel before it cuts the panel in two.
 # Shorter ones (3, 5) were tried: across an unannounced kink two of them can agree by accident.
@@ -110,12 +111,12 @@ def spectral_nodes(
     splits
         Frequencies where the integrand has a kink [rad/s]; those outside the band are ignored.
     poles
-        Poles s [rad/s] of what is integrated, in any half plane; panels shrink towards each until
-        they are no longer than twice their distance from it.  A feature that is no pole, such as
-        the hump of a JONSWAP spectrum, is given as :math:`-b + i \omega` with its half-width b.
-        Poles at zero are ignored (they are infinitely far away in log-frequency).
+        Poles s [rad/s] of what is integrated, in any half plane; nodes crowd about near ones.  What
+        is no pole, such as the hump of a JONSWAP spectrum, is given as :math:`-b + i \omega` with
+        its half-width b.  Poles at zero are ignored (infinitely far away in log-frequency).
     per_panel
-        Nodes on a panel as long as the pole's distance allows; shorter panels get fewer.
+        Nodes on a panel that is twice as long as its distance from all poles; shorter ones get
+        fewer, and those about a pole more.
     panels_per_decade
         Least number of panels per decade, which stands for the smoothness of everything that
         is not a pole.
@@ -143,15 +144,11 @@ def spectral_nodes(
     axis = FrequencyAxis(low, high, half_line)
     if per_panel < 2:
         raise InputError(f"quadrature: per_panel must be at least 2, got {per_panel!r}")
-    marks = axis.poles(poles)
     longest = longest_panel(panels_per_decade)
-    panels = np.array(cut_panels(axis, splits, marks, longest, clearance=1.0))
-    half = 0.5 * (panels[:, 1] - panels[:, 0])
-    away = distance(panels[:, :1], panels[:, 1:], np.array(marks, dtype=np.complex128))
-    ratio = away.min(axis=1, initial=0.5 * longest) / half
-    rho = ratio + np.hypot(ratio, 1.0)
-    counts = np.ceil(per_panel * math.log(_RHO_REFERENCE) / np.log(rho)).astype(np.int64)
-    omega, weights = axis.rules(panels, np.clip(counts, min(3, per_panel // 2), per_panel))
+    panels, about, ratio = stretched_panels(axis, splits, axis.poles(poles), longest)
+    counts = per_panel * math.log(_RHO_REFERENCE) / np.log(ratio + np.hypot(ratio, 1.0))
+    counts = np.maximum(np.ceil(counts), min(3, per_panel // 2)).astype(np.int64)
+    omega, weights = axis.rules(panels, counts, about)
     return Quadrature(omega=omega, weights=weights)
 
 

@@ -140,7 +140,7 @@ class Resolvent:
         """Whether a state, (row), hears another one, (column), through however many others."""
         reach: BoolArray = (self.A != 0.0) | np.eye(len(self.A), dtype=np.bool_)
         for _ in range(len(self.A).bit_length()):
-            reach = reach @ reach
+            reach = (ones := reach.astype(np.float32)) @ ones > 0.0  # far faster than of booleans
         return reach
 
     @cached_property

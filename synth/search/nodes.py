@@ -22,8 +22,8 @@ _INSIDE = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # nodes about the edge of a limit's 
 _GLANCED_PER_DECADE = 40  # margin frequencies; peaks and crossings between them are refined
 _AT_ZERO = 1e-9  # relative size of a pole at zero, which no panel need shrink towards
 _ON_AXIS = 1e-9  # relative distance of a pole from the axis below which no node can resolve it
-_PANELS = {"rough": (4, 2.0), "coarse": (6, 3.0), "fine": (10, 4.0)}
-"""Nodes a panel and panels a decade: 1e-4, 1e-6 and 1e-8 of an rms."""
+_PANELS = {"rough": (4, 2.0, 0.1), "coarse": (7, 3.0, 1e-9), "fine": (10, 4.0, 1e-9)}
+"""Nodes a panel, panels a decade, least ln of kinks' ratio: 1e-3, 1e-6 and 1e-8 of an rms."""
 
 
 def cost_nodes(problem: Problem, poles: ComplexArray, how: str = "coarse") -> Quadrature:
@@ -35,11 +35,13 @@ def cost_nodes(problem: Problem, poles: ComplexArray, how: str = "coarse") -> Qu
     every = np.concatenate([poles, problem.plant.poles()])
     every = every[np.abs(every) > _AT_ZERO * np.abs(every).max(initial=1.0)]
     low, high, half_line = integration_band(problem.disturbances, every)
-    per_panel, per_decade = _PANELS[how]
+    per_panel, per_decade, apart = _PANELS[how]
+    splits = np.unique([omega for d in problem.disturbances for omega in d.splits if omega > 0.0])
+    splits = splits[np.unique(np.floor(np.log(splits) / apart), return_index=True)[1]]
     return spectral_nodes(
         low,
         high,
-        splits=[omega for d in problem.disturbances for omega in d.splits],
+        splits=splits.tolist(),
         poles=every[np.abs(every.real) > _ON_AXIS * np.abs(every)],
         per_panel=per_panel,
         panels_per_decade=per_decade,

@@ -109,7 +109,7 @@ def sweep_nodes(
     panels need to be no shorter than the responses ask for.  `apart` is whether the difference of
     the two rules on each panel is wanted instead of the shorter rule, as many more rules.
     """
-    cuts = [axis.cut(complex(w)).real for w in kinks]
+    cuts = axis.cut(np.array(kinks, dtype=np.complex128)).real.tolist()
     omega, weights, sea = [], [], []
     for a, b in panels:
         x, *rules = _rule()
@@ -141,7 +141,7 @@ def _product(
     ]
     at, weights = axis.rules(list(pairwise([*np.concatenate(edges), b])), _FINE_RULE)
     fine = weights * density(at)
-    t = np.array([axis.cut(complex(w)).real for w in at])
+    t = axis.cut(at.astype(np.complex128)).real
     points = (2.0 * t - a - b) / (b - a)
     found = np.zeros((2, x.size))
     for row, step in ((0, 1), (1, 2)):
