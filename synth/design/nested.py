@@ -96,10 +96,11 @@ def starts_from(
 
 
 def _answer(question: DesignQuestion, starts: int, seed: int, progress: Progress | None) -> Tuning:
-    """Return the answer of a structure within another."""
+    """Return the answer of a structure within another, good enough to begin with."""
     guesses = nested_starts(question, starts, seed, progress)
     problem = question.problem_with(question.loop)
-    return tuning_of(problem, search(problem, starts + len(guesses), seed, guesses, progress))
+    count = starts + len(guesses)
+    return tuning_of(problem, search(problem, count, seed, guesses, progress, hops=False))
 
 
 def gains_in_use(question: DesignQuestion) -> list[list[float]]:

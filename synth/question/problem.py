@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -76,23 +76,17 @@ class Problem:
         return tuple(dict.fromkeys([*(d.name for d in self.disturbances), *spoken]))
 
     @cached_property
-    def _opened(self) -> LinearPlant:
-        """The plant with its elements' loops open, their inputs and measurements the last."""
-        plant = self.plant
-        for element in self.elements:
-            plant = plant.opened(element.velocity, element.force)
-        return plant
-
-    @cached_property
     def _channels(self) -> tuple[LinearPlant, list[str]]:
         """What margins need of the plant, and the disturbances that limits on them speak of."""
         channels = [limit.channel for limit in self.limits if limit.channel is not None]
         outputs = dict.fromkeys(output for output, _ in channels)
-        return self._opened.select(outputs=[*outputs]), [*dict.fromkeys(w for _, w in channels)]
+        opened = _opened(self.plant, self.elements)
+        return opened.select(outputs=[*outputs]), [*dict.fromkeys(w for _, w in channels)]
 
     def blocks(self, s: npt.ArrayLike) -> LoopBlocks:
         """Return what the plant's loop is closed about at points `s` [1/s], elements too."""
-        return LoopBlocks.of(self._opened.response_at(s), self.outputs, self.sources)
+        opened = _opened(self.plant, self.elements)
+        return LoopBlocks.of(opened.response_at(s), self.outputs, self.sources)
 
     def margin_blocks(self, s: npt.ArrayLike) -> LoopBlocks:
         """Return as much of `blocks` as the limits on the loop need."""
@@ -141,17 +135,14 @@ class Problem:
         On as few states as that takes (`synth.loop.LoopModel`), so without damped poles of the
         plant that no loop moves: what stability is asked of.
         """
-        controller, model = self.law.controller([float(v) for v in values]), self._loop_model
+        controller = self.law.controller([float(v) for v in values])
+        model = _loop_model(self.plant, self.elements)
         references = [element.reference for element in self.elements]
         for coefficients in asked:
             known = references if coefficients is None else coefficients
             gains = [r - c for r, c in zip(references, known, strict=True)]
             poles = np.linalg.eigvals(model.closed(controller, gains))
             yield np.asarray(poles, dtype=np.complex128)
-
-    @cached_property
-    def _loop_model(self) -> LoopModel:
-        return LoopModel.of(with_delay_models(self._opened)[0])
 
     def growth(self, values: Values) -> float:
         """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
@@ -206,6 +197,20 @@ class Problem:
             elements=self.elements,
             coefficients=coefficients,
         )
+
+
+# Problems that differ in limits or shaking alone have these in common.
+@lru_cache(maxsize=16)
+def _opened(plant: LinearPlant, elements: tuple[Element, ...]) -> LinearPlant:
+    """Return a plant with its elements' loops open, their inputs and measurements the last."""
+    for element in elements:
+        plant = plant.opened(element.velocity, element.force)
+    return plant
+
+
+@lru_cache(maxsize=16)
+def _loop_model(plant: LinearPlant, elements: tuple[Element, ...]) -> LoopModel:
+    return LoopModel.of(with_delay_models(_opened(plant, elements))[0])
 
 
 def _abscissa(poles: ComplexArray) -> float:

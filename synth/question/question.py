@@ -13,7 +13,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -450,8 +450,9 @@ def locked_response(case: Case, omega: FloatArray, drag: float) -> ComplexArray:
     return held_transfers(PlantData.from_case(case), s, drag)[0]
 
 
+@lru_cache(maxsize=16)
 def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
-    """Return the question on another number of rope masses."""
+    """Return the question on another number of rope masses, the same one if asked again."""
     model, heard = build_plant(question.data, masses), question.structure.measurements
     return replace(
         question,

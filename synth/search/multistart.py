@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -34,7 +35,7 @@ _AS_GOOD = 5e-3  # of the log cost, by which rough answers may differ that are a
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one
-_LONGER = 3  # how often a rough descent that ran out of steps goes on
+_LONGER = 5  # how often a rough descent that ran out of steps goes on
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
 _BEST_STARTS = 6  # of the search for the best of one member alone
@@ -118,14 +119,15 @@ def search(
     *,
     only_guesses: bool = False,
     kept_only: bool = False,
+    hops: bool = True,
 ) -> Found:
     """Return the best answer of a multi-start search over a family.
 
     `starts` and `seed` are its size and seed.  It begins with guesses of the searched
     parameters before any that are drawn.  With `only_guesses` nothing is drawn: it starts from the
     guesses alone, if any of them is stable.  With `kept_only` it looks for nothing else where no
-    start arrives at an answer that keeps the limits.  `progress` is called as progress(stage, done,
-    total).
+    start roughly arrives at an answer that keeps the limits.  Without `hops` it does not look about
+    the best.  `progress` is called as progress(stage, done, total).
     """
     tell = progress or (lambda stage, done, total: None)
     family = FamilyProblem.of(asked)
@@ -141,8 +143,10 @@ def search(
         return Found(solved=None)
     reference = briskest(family, begins)
     places = _places(family, begins, reference, count, len(kept), share * _ENOUGH, tell)
-    if not only_guesses:
+    if hops and not only_guesses:
         _hopped(family, places, reference, starts, seed, tell)
+    if kept_only:
+        places = [place for place in places if place.arrived]
     records, first = _descents(family, places, reference, starts, tell)
     if not first and kept_only:
         return Found(solved=None, starts=records, reference=reference)
@@ -211,14 +215,17 @@ def _come_by(
     """Return the place where a start leads, with the start added to it."""
     # By discs and by true margins in turns: each of them finds basins that the other misses.
     exact = sum(len(place.begins) for place in places) % 2 == 1
-    coarse = settle(family, begin, coefficients, reference=reference, rounds=1, exact=exact)
+    best = min((p.coarse.objective for p in places if p.arrived), default=np.inf)
+    rough = partial(settle, family, reference=reference, rounds=1)
+    coarse = rough(begin, coefficients, exact=exact)
     for _ in range(_LONGER):
         # Along a flat valley a descent takes long; it is worth its while where it may be the best.
-        best = min((p.coarse.objective for p in places if p.arrived), default=np.inf)
         if coarse.message != UNFINISHED or coarse.objective > best + _BEHIND:
             break
-        here, drags = coarse.values, coarse.coefficients
-        coarse = settle(family, here, drags, reference=reference, rounds=1, exact=exact)
+        coarse = rough(coarse.values, coarse.coefficients, exact=exact)
+    if not exact and coarse.converged and coarse.objective < best:
+        # The best so far by a margin that leaks between the nodes, maybe.
+        coarse = rough(coarse.values, coarse.coefficients, exact=True)
     place = next((p for p in places if _same(family, p.coarse, coarse)), None)
     if place is None:
         place = _Place(coarse)

@@ -20,7 +20,7 @@ from .sqp import INFEASIBLE
 
 KEPT = 1e-5  # relative excess over a limit that counts as none
 _PER_DECADE, _FINE_PER_DECADE = 40, 60  # margin nodes
-_ROUGH_STEPS = 60  # of a rough descent, which goes on where it may be the best
+_ROUGH_STEPS = 40
 _ROUNDS, _FINE_ROUNDS = 3, 4  # of a descent with new nodes
 _SETTLED, _FINE_SETTLED = 1e-4, 1e-6  # change of the log objective below which nodes are right
 _HAIR = 2e-2  # relative excess that tightening may still mend
@@ -43,7 +43,7 @@ def stated(
     """Return a programme of a family on nodes that suit the loops at a point.
 
     The point is one of searched parameters, and of coefficients of elements.  Goal, reference and
-    relaxed limits are as `Programme` takes them.  The nodes are for four digits if `rough`, for
+    relaxed limits are as `Programme` takes them.  The nodes are for three digits if `rough`, for
     eight if `fine`; if `exact`, margins are held where they are measured.
     """
     family = FamilyProblem.of(asked)
@@ -60,7 +60,8 @@ def stated(
             least = _NEARLY_ZERO * float(found.omega[found.omega > 0.0].min())
             nodes.append(replace(found, omega=np.maximum(found.omega, least)))
         else:
-            nodes.append(cost_nodes(shaken, poles, "fine" if fine else "coarse"))
+            how = "fine" if fine else "rough" if rough else "coarse"
+            nodes.append(cost_nodes(shaken, poles, how))
         per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
         omega.append(margin_nodes(scenario.problem, poles, per_decade))
     tolerance = 1e-13 if fine else 1e-4 if rough else 1e-6
