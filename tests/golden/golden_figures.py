@@ -849,13 +849,14 @@ def _commands(found: Figures, prefix: str, name: str) -> None:
         series = np.asarray(recorder.commands)[::every][:100]
         found.series[f"{prefix}.{label}"] = series
         predicts = "mpc" in label
-        elsewhere = 1e-2 if predicts else None
-        note = "the fitted filter of the sea moves with the BLAS's kernels" if predicts else ""
+        # On one machine the same code gives either of two answers, 2e-3 apart.
+        tolerance = 1e-2 if predicts else None
+        note = "the fitted filter of the sea moves with the BLAS's rounding" if predicts else ""
         for name, value in (
             ("norm", np.linalg.norm(series)),
             ("payload", runs[0][PAYLOAD].std()),
         ):
-            found.put(f"{prefix}.{label}.{name}", value, "command", elsewhere=elsewhere, note=note)
+            found.put(f"{prefix}.{label}.{name}", value, "command", tolerance=tolerance, note=note)
 
 
 @group()
