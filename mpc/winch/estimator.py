@@ -158,14 +158,12 @@ class WinchEstimator:
         self.gated = bool((there > believed).any())
         there = believed
         self._unheard = 0 if there[_TELEMETRY].any() else self._unheard + 1
-        if rows is not self._C or not there.all():
-            gain = self._gains.at(there, None if rows is self._C else rows)
-            error = np.where(there, error, 0.0)
-        elif self._samples < len(self._first):
+        if there.all() and self._samples < len(self._first):
             gain = self._first[self._samples]
             self._samples += 1
         else:
-            gain = self._gains.at(there)
+            gain = self._gains.at(there, None if rows is self._C else rows)
+            error = np.where(there, error, 0.0)
         self.state = ahead + gain @ error
         if not float(np.abs(self.state).max()) < _HUGE:  # no number, or no longer of this world
             self.reset()

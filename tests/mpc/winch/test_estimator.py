@@ -137,6 +137,21 @@ def test_signals_that_nobody_planned_for_have_a_gain_too():
     assert gains.covariance[0, 0] < 10.0 * before
 
 
+def test_a_link_whose_age_varies_has_the_first_gains_too(estimator):
+    """Else a load of another weight is learnt as slowly as the constants drift."""
+    model, rng = estimator.model, np.random.default_rng(5)
+    chi = 0.01 * model.scale * rng.normal(size=model.size)
+    estimator.reset()
+    estimator.update(shown(model, chi, age=0.03))
+    C = estimator._late(0.03)
+    assert C is not estimator._C
+    # No numbers have been turned away, and nothing was expected but rest.
+    np.testing.assert_allclose(
+        estimator.state, estimator._first[0] @ (C @ chi), rtol=1e-6, atol=1e-9
+    )
+    estimator.reset()
+
+
 @pytest.mark.parametrize("lost", ["mru__valid", "payload__valid"])
 def test_what_is_shown_as_lost_is_not_looked_at(estimator, lost):
     model = estimator.model
