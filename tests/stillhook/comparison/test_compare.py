@@ -202,6 +202,17 @@ def test_a_first_answer_of_everybody_comes_before_a_second_seed_and_any_design(m
     assert seen[1].pooled("feed-forward", 0.5) > 0.0
 
 
+def cell_of(task, told):
+    """Return the cell of a task that was completed with some quantities."""
+    return Cell(
+        contender=task.name,
+        height=task.height,
+        seed=task.seed,
+        status="completed",
+        quantities=told,
+    )
+
+
 def test_each_kind_takes_part_once_unless_others_are_named(monkeypatch):
     asked = []
 
@@ -210,13 +221,7 @@ def test_each_kind_takes_part_once_unless_others_are_named(monkeypatch):
         told = {"tracking error rms": 0.1, "tracking error largest": 0.3, "saturated share": 1.0}
         if task.kind == "design":
             return StoredDesign.of(thesis_design())
-        return Cell(
-            contender=task.name,
-            height=task.height,
-            seed=task.seed,
-            status="completed",
-            quantities=told,
-        )
+        return cell_of(task, told)
 
     monkeypatch.setattr(CellBench, "do", noted)
     found = sh.compare(CASE, jobs=1, traces=False)
@@ -246,13 +251,7 @@ def test_there_is_no_floor_where_no_drive_is_at_its_limits(monkeypatch, share, l
         told = {"tracking error rms": 0.1, "tracking error largest": 0.3, "saturated share": 0.0}
         if task.name == "mpc":
             told |= {"saturated share": share} | ({"lost lock at": 10.0} if lost else {})
-        return Cell(
-            contender=task.name,
-            height=task.height,
-            seed=task.seed,
-            status="completed",
-            quantities=told,
-        )
+        return cell_of(task, told)
 
     monkeypatch.setattr(CellBench, "do", noted)
     found = sh.compare(CASE, ["feed-forward", "clairvoyant", "mpc"], jobs=1, **FAST)
