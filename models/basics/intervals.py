@@ -117,8 +117,8 @@ def pooled_interval(
     Examples
     --------
     >>> found = pooled_interval([9.0, 10.0, 11.0])
-    >>> print(f"{found.mean:.3f} ({found.low:.3f} to {found.high:.3f})")
-    10.033 (7.837 to 12.844)
+    >>> print(f"{found.mean:.2f} ({found.low:.2f} to {found.high:.2f})")
+    10.03 (7.84 to 12.84)
     >>> found = pooled_interval([9.0, 10.0, 11.0], [4.5, 5.0, 5.5])
     >>> print(f"{found.mean:g} ({found.low:g} to {found.high:g})")
     2 (2 to 2)
