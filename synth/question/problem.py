@@ -29,6 +29,7 @@ from ..structures import ParametrisedController
 Values = Sequence[float] | FloatArray
 
 _SLOW = 1e-4  # no real pole slower than this share of the plant's slowest one
+_KEPT = 4  # sets of poles
 _DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 
 
@@ -138,11 +139,22 @@ class Problem:
         controller = self.law.controller([float(v) for v in values])
         model = _loop_model(self.plant, self.elements)
         references = [element.reference for element in self.elements]
+        at = tuple(map(float, values))
         for coefficients in asked:
             known = references if coefficients is None else coefficients
-            gains = [r - c for r, c in zip(references, known, strict=True)]
-            poles = np.linalg.eigvals(model.closed(controller, gains))
-            yield np.asarray(poles, dtype=np.complex128)
+            point = at, tuple(map(float, known))
+            if point not in self._lately:
+                gains = [r - c for r, c in zip(references, known, strict=True)]
+                poles = np.linalg.eigvals(model.closed(controller, gains))
+                while len(self._lately) >= _KEPT:
+                    del self._lately[next(iter(self._lately))]
+                self._lately[point] = np.asarray(poles, dtype=np.complex128)
+            yield self._lately[point]
+
+    @cached_property
+    def _lately(self) -> dict[tuple[tuple[float, ...], tuple[float, ...]], ComplexArray]:
+        """Lively poles asked for last: a step asks whether it is stable, then for rows."""
+        return {}
 
     def growth(self, values: Values) -> float:
         """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""

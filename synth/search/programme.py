@@ -45,7 +45,7 @@ from ..question import (
     moment_weights,
     on_sides,
 )
-from .sqp import Descent, Evaluation, descend
+from .sqp import Descent, Evaluation, Glance, descend
 
 _ROOM = 12.0  # how far the logarithms of drag, sea and factors may move: e^12
 _STEPS, _MOST_STEPS = 60, 120  # of a solve with few and with many parameters
@@ -228,6 +228,7 @@ class Programme:
         low, high = self._box(start, reach)
         found = descend(
             lambda x: self.evaluate(x, tighten),
+            lambda x: self.glance(x, tighten),
             self.stable,
             start,
             low,
@@ -312,6 +313,28 @@ class Programme:
         bends = [curvatures[i] for i in every] if slopes else []
         return [(costs[i], i) for i in every], rows, balances, bends
 
+    def glance(self, x: FloatArray, tighten: Tighten | None = None) -> Glance:
+        """Return the programme at a vector, without slopes; see `solve`."""
+        with np.errstate(all="ignore"):
+            costs, rows, balances, _ = self._parts(x, tighten, slopes=False)
+        logs = np.array([cost.item() for cost, _ in costs])
+        values = [row.ravel() for _, row, _ in rows]
+        objective = float(logs[0] - self._best[0])
+        if self._extra_at is not None:
+            objective = self._sign * float(x[self._extra_at])
+        elif self._mean:
+            objective = float(np.log(self.family.total(np.exp(logs))))
+        elif self._bound_at is not None:
+            objective = float(x[self._bound_at])
+            values.append(logs - self._best - objective)
+        equations = np.concatenate([np.zeros(0), *(balance for balance, _ in balances)])
+        return Glance(objective=objective, rows=np.concatenate(values), equations=equations)
+
+    @property
+    def _sign(self) -> float:
+        """With which the variable of a goal other than the cost is made small."""
+        return -1.0 if self._goal is Goal.SEA else 1.0
+
     def evaluate(self, x: FloatArray, tighten: Tighten | None = None) -> Evaluation:
         """Return the programme at a vector, with slopes; see `solve`."""
         at = self._values(x)
@@ -329,8 +352,8 @@ class Programme:
         spread = [(float(c.value.item()), self._spread(c, i, at)[0]) for c, i in costs]
         slope = np.zeros(self.size)
         if self._extra_at is not None:
-            sign = -1.0 if self._goal is Goal.SEA else 1.0
-            objective, slope[self._extra_at] = sign * float(x[self._extra_at]), sign
+            objective = self._sign * float(x[self._extra_at])
+            slope[self._extra_at] = self._sign
         elif self._mean:
             weights = np.array([s.weight for s in self.family.scenarios])
             shares = weights * np.exp(2.0 * np.array([c for c, _ in spread]))
@@ -406,7 +429,8 @@ class Programme:
             converged=found.converged,
             message=found.message,
             iterations=found.steps,
-            prices=self._prices(found, tighten) if reached else self._free(),
+            # Nobody asks what a limit costs on the way.
+            prices=self._prices(found, tighten) if reached and self._calm else self._free(),
             costs=np.asarray(costs),
             pressure=np.asarray(pressure / max(float(np.sum(pressure)), 1e-300)),
         )

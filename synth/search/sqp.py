@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import daqp
 import numpy as np
 from scipy.linalg import eigh
+from typing_extensions import override
 
 from models.basics import BoolArray, FloatArray
 
@@ -45,23 +46,12 @@ _SKIPPED = 1e-6  # an update along less than this share of a step is left out
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evaluation:
-    """A programme at a point: objective, rows at most zero, equations, and their slopes.
-
-    Shapes: slope (n,), rows (m,), jacobian (m, n), firm (m,), equations (e,), their slopes (e, n).
-    A `firm` row is held while others are broken still: beyond it no point may be evaluated.
-    `curvature` (n, n), positive semidefinite, is a model of the objective's Hessian from its
-    slopes alone (Gauss-Newton).
-    """
+class Glance:
+    """A programme at a point: objective, rows (m,) at most zero, equations (e,)."""
 
     objective: float
-    slope: FloatArray
     rows: FloatArray
-    jacobian: FloatArray
-    firm: BoolArray
     equations: FloatArray
-    equation_slopes: FloatArray
-    curvature: FloatArray
 
     @property
     def broken(self) -> float:
@@ -73,8 +63,31 @@ class Evaluation:
     @property
     def finite(self) -> bool:
         """Whether everything is a number."""
-        parts = (self.slope, self.rows, self.jacobian, self.equations)
-        return bool(np.isfinite(self.objective) and all(np.all(np.isfinite(p)) for p in parts))
+        parts = (self.objective, self.rows, self.equations)
+        return all(bool(np.all(np.isfinite(part))) for part in parts)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evaluation(Glance):
+    """A programme at a point with its slopes.
+
+    Shapes: slope (n,), jacobian (m, n), firm (m,), slopes of the equations (e, n).  A `firm` row is
+    held while others are broken still: beyond it no point may be evaluated.  `curvature` (n, n),
+    positive semidefinite, is a model of the objective's Hessian from its slopes alone
+    (Gauss-Newton).
+    """
+
+    slope: FloatArray
+    jacobian: FloatArray
+    firm: BoolArray
+    equation_slopes: FloatArray
+    curvature: FloatArray
+
+    @property
+    @override
+    def finite(self) -> bool:
+        parts = (self.slope, self.jacobian)
+        return super().finite and all(bool(np.all(np.isfinite(part))) for part in parts)
 
     def lagrangian_slope(self, prices: FloatArray, equation_prices: FloatArray) -> FloatArray:
         """Return the slope of objective + prices . rows + prices . equations, (n,)."""
@@ -97,6 +110,7 @@ class Descent:
 
 def descend(
     evaluate: Callable[[FloatArray], Evaluation],
+    glance: Callable[[FloatArray], Glance],
     stable: Callable[[FloatArray], bool],
     start: FloatArray,
     low: FloatArray,
@@ -108,7 +122,8 @@ def descend(
 ) -> Descent:
     """Return the point near a start where nothing gets better within the rows.
 
-    `evaluate` gives the programme at a vector (n,), and `stable` says whether it may be evaluated.
+    `evaluate` gives the programme at a vector (n,), `glance` the same without slopes for less, and
+    `stable` says whether it may be evaluated.
     The start and the ends of each variable are (n,); so is `logarithmic`, which of them are
     logarithms, of size one.  A step must promise more than `tolerance` of the objective to be
     taken; there are at most `most`.
@@ -135,6 +150,7 @@ def descend(
     room, weight, stalled, stiff = _ROOM, _FIRST_WEIGHT, 0, _SHARE
     prices, equation_prices = np.zeros(at.rows.size), np.zeros(at.equations.size)
     reached: list[float] = []  # objectives since the rows are kept
+    bends = False  # whether the last step was a bent one
     for k in range(most):
         size = np.where(logarithmic, 1.0, _sizes(x, at))
         hessian = at.curvature + rest
@@ -165,9 +181,12 @@ def descend(
                 return _ended(x, at, prices, "", k + 1)
             if weight >= _HEAVY or slack > _KEPT:
                 return _ended(x, at, prices, INFEASIBLE, k)
+        # A step that will be bent need not have slopes where it leads at first.
+        look = glance if bends else evaluate
         moved, new, share = _tried(
-            evaluate, stable, x, step, weight, promised, at, hessian, box, stiff
+            evaluate, look, stable, x, step, weight, promised, at, hessian, box, stiff
         )
+        bends = not np.array_equal(moved, x + step)
         length = float(np.max(np.abs(moved - x) / size))
         if new is not None:  # what a step that failed tells of the curvature is worth as much
             rest = _updated(rest, moved - x, at, new, prices, equation_prices)
@@ -284,6 +303,7 @@ def _quadratic(
 
 def _tried(
     evaluate: Callable[[FloatArray], Evaluation],
+    look: Callable[[FloatArray], Glance],
     stable: Callable[[FloatArray], bool],
     x: FloatArray,
     step: FloatArray,
@@ -296,17 +316,17 @@ def _tried(
 ) -> tuple[FloatArray, Evaluation | None, float]:
     """Return where a step leads to, what is there, and the share of what it promised that it kept.
 
-    There is nothing where the loop is unstable.
+    There is nothing where the loop is unstable.  `look` is `evaluate`, or does without slopes.
     """
     merit = at.objective + weight * at.broken
 
-    def kept(new: Evaluation) -> float:
+    def kept(new: Glance) -> float:
         # A hair of slack: at the answer itself the merit only rounds.
         gained = merit - new.objective - weight * new.broken + 1e-12 * (1.0 + abs(merit))
         return gained / promised
 
     there = x + step
-    new = evaluate(there) if stable(there) else None
+    new = look(there) if stable(there) else None
     if new is None or not new.finite:
         return there, None, -np.inf
     share = kept(new)
@@ -323,7 +343,7 @@ def _tried(
             bent = evaluate(x + again[0])
             if bent.finite and kept(bent) > share:
                 return x + again[0], bent, kept(bent)
-    return there, new, share
+    return there, new if isinstance(new, Evaluation) else evaluate(there), share
 
 
 def _convex(curvature: FloatArray, model: FloatArray, share: float) -> FloatArray:

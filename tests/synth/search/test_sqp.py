@@ -36,6 +36,7 @@ def test_an_answer_keeps_its_prices_where_values_round(beside: float) -> None:
 
     found = descend(
         evaluate,
+        evaluate,
         lambda x: True,
         start,
         np.array([-10.0, -10.0]),
