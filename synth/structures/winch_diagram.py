@@ -32,9 +32,10 @@ import numpy as np
 from scipy.stats import qmc
 
 from models.basics import ComplexArray, FloatArray, InputError, check_range, pick
-from models.plant import MEASUREMENTS, LinearPlant, PlantResponse
+from models.plant import MEASUREMENTS, LinearPlant
 from models.sensing import MEASURED
 
+from ..loop import Disturbance
 from .blocks import FilterSection, lead_time
 from .diagram import Branch, DiagramLaw, Weight
 from .drum_speed import SteadyMotion
@@ -57,6 +58,7 @@ _GAINS = ("a", "a1", "a2")
 #: What the payload asks of the drum: speed per acceleration [s], velocity [-], position [1/s].
 ASKED = ("payload.acceleration_gain", "payload.velocity_gain", "payload.position_gain")
 _NODES = np.geomspace(0.05, 20.0, 240)  # at which a feed-forward is fitted [rad/s]
+_LEAST_FED, _SINGULAR = 0.05, 1e-12  # gain that counts as one; relative size of no effect
 _TOP = 3.0  # candidates' loop gains reach this at their crossover
 
 
@@ -253,55 +255,59 @@ class WinchLaw(DiagramLaw):
             drawn[::4, columns] *= 0.02
         if not self._structure.heave:
             return drawn
-        response = problem.plant.response(_NODES)
-        for row in drawn:
-            self._feed(row, problem, response)
-        return self.clipped(drawn)
+        return self.clipped(self._fed(drawn, problem))
 
     def fed(self, values: Sequence[float], problem: GeneralisedPlant) -> list[list[float]]:
         """Return parameters with the feed-forward that suits the rest best, if there is one."""
         if not self._structure.heave:
             return []
-        row = np.array(values, dtype=np.float64)
-        self._feed(row, problem, problem.plant.response(_NODES))
-        return [[float(v) for v in self.clipped(row[None])[0]]]
+        rows = np.array([values], dtype=np.float64)
+        return [[float(v) for v in self.clipped(self._fed(rows, problem))[0]]]
 
-    def _feed(self, row: FloatArray, problem: GeneralisedPlant, response: PlantResponse) -> None:
-        """Set gain and lead of the feed-forward to the best for the rest of a candidate."""
+    def _fed(self, rows: FloatArray, problem: GeneralisedPlant) -> FloatArray:
+        """Return candidates, (b, n), with gain and lead of the feed-forward best for the rest."""
         gain, lead = self.index("heave.gain"), self.index("heave.lead")
+        response = problem.plant.response(_NODES)
+        columns = list(rows.T[:, :, None])
 
-        def heard(g: float, tau: float) -> Any:
-            values = row.copy()
-            values[gain], values[lead] = g, tau
-            return self.response(list(values), 1j * response.omega)[0]
+        def commanded(g: float, tau: float) -> list[Any]:
+            values = [*columns]
+            values[gain], values[lead] = np.array([[g]]), np.array([[tau]])
+            return self.response(values, 1j * response.omega)[0]
 
-        none, one, ahead = heard(0.0, 0.0), heard(1.0, 0.0), heard(1.0, 1.0)
+        none, one, ahead = commanded(0.0, 0.0), commanded(1.0, 0.0), commanded(1.0, 1.0)
         loop = 1.0 - sum(c * response.yu[:, j, 0] for j, c in enumerate(none))
-        rows, right = [], []
+        # Normal equations of each candidate: of what gain, and gain times lead, make of the motion.
+        matrix, right = np.zeros((len(rows), 2, 2)), np.zeros((len(rows), 2, 1))
+        densities = [_density(d, response.omega) for d in problem.disturbances]
         for output, weight in problem.minimise.items():
             z = response.outputs.index(output)
             through = response.zu[:, z, 0] / loop
-            for disturbance in problem.disturbances:
+            for disturbance, density in zip(problem.disturbances, densities, strict=True):
                 w = response.disturbances.index(disturbance.name)
-                density = disturbance.density(response.omega)
-                if disturbance.band is not None:
-                    low, high = disturbance.band
-                    density = density * ((response.omega >= low) & (response.omega <= high))
                 size = np.sqrt(weight * density * np.gradient(response.omega))
+                before, after, later = (
+                    through * sum(c * response.yw[:, j, w] for j, c in enumerate(law)) * size
+                    for law in (none, one, ahead)
+                )
+                base = response.zw[:, z, w] * size + before
+                parts = np.stack([after - before, later - after], axis=1).conj()
+                matrix += (parts @ parts.conj().swapaxes(1, 2)).real
+                right -= (parts @ base[:, :, None]).real
+        best = (np.linalg.pinv(matrix, rcond=_SINGULAR, hermitian=True) @ right)[:, :, 0]
+        found, helps = rows.copy(), best[:, 0] > _LEAST_FED
+        found[helps, gain] = best[helps, 0]
+        found[helps, lead] = np.maximum(0.0, best[helps, 1] / best[helps, 0])
+        return found
 
-                def caused(law: Any, w: int = w, through: Any = through) -> Any:
-                    return through * sum(c * response.yw[:, j, w] for j, c in enumerate(law))
 
-                base = response.zw[:, z, w] + caused(none)
-                first = caused(one) - caused(none)
-                second = caused(ahead) - caused(one)
-                rows.append(np.column_stack([first, second]) * size[:, None])
-                right.append(-base * size)
-        matrix, b = np.vstack(rows), np.concatenate(right)
-        both = np.vstack([matrix.real, matrix.imag])
-        found = np.linalg.lstsq(both, np.concatenate([b.real, b.imag]), rcond=1e-10)[0]
-        if found[0] > 0.05:
-            row[gain], row[lead] = found[0], max(0.0, found[1] / found[0])
+def _density(disturbance: Disturbance, omega: FloatArray) -> FloatArray:
+    """Return the density of a disturbance where it has a band, and zero elsewhere, (k,)."""
+    density = disturbance.density(omega)
+    if disturbance.band is None:
+        return density
+    low, high = disturbance.band
+    return density * ((omega >= low) & (omega <= high))
 
 
 def _product(factor: float, *names: str) -> Weight:
