@@ -19,6 +19,8 @@ LoopGain = Callable[[FloatArray], ComplexArray]
 """From frequencies [rad/s], (k,), to L there, (k,), or that of n loops, (n, k)."""
 
 _NOTHING = 1e-9  # |L| below which neither a peak nor a crossing matters to any margin
+_HIGHER = 1.5  # of the least on the grid: what is higher is not the least between its points
+_FLAT = 0.95  # |1 + L| from which S has no peak
 _CLOSE, _MOST_STEPS = 1e-13, 50  # relative width of a bracket that is a point; steps towards it
 _HAIR = 0.1  # share of a bracket beside the first guess of a crossing in it
 _ORDER = 10  # of the polynomials about a minimum
@@ -137,7 +139,10 @@ def worst_margins(margins: list[Margins]) -> Margins:
 def least_distances(
     loops: LoopGain, grid: FloatArray, gains: ComplexArray
 ) -> list[list[tuple[FloatArray, FloatArray]]]:
-    """Return places and values of the local minima of |1 + L| and of 1/|S - 1/2| of each loop."""
+    """Return places and values of the local minima of |1 + L| and of 1/|S - 1/2| of each loop.
+
+    Those count that may be the least, and of |1 + L| those where |S| has a peak worth the name.
+    """
 
     def distances(at: ComplexArray) -> FloatArray:
         # |S - 1/2| = |1 - L| / (2 |1 + L|); 1 - L may vanish: the distance is then unbounded, which
@@ -146,8 +151,11 @@ def least_distances(
         return np.concatenate([own, 2.0 * own / np.maximum(np.abs(1.0 - at), 1e-300)])
 
     gains = np.atleast_2d(gains)
-    felt = np.tile(np.abs(gains) > _NOTHING, (2, 1))
-    found = _all_minima(lambda w: distances(np.atleast_2d(loops(w))), grid, distances(gains), felt)
+    on_grid = distances(gains)
+    high = np.tile([[_FLAT], [0.0]], (1, len(gains))).reshape(-1, 1)
+    worth = on_grid < np.maximum(_HIGHER * on_grid.min(axis=1, keepdims=True), high)
+    worth &= np.tile(np.abs(gains) > _NOTHING, (2, 1))
+    found = _all_minima(lambda w: distances(np.atleast_2d(loops(w))), grid, on_grid, worth)
     return [[found[i], found[len(gains) + i]] for i in range(len(gains))]
 
 
