@@ -308,8 +308,7 @@ def _look(
     response = loop_gain = omega.astype(np.complex128)
     if loop is not None:
         omega, loop_gain = loop.grid, loop.gains[0]
-        response = loop.response(PAYLOAD, HOOK, omega)
-        spectrum = loop.spectrum(PAYLOAD, omega)
+        response, spectrum = loop.curves(PAYLOAD, HOOK, omega)
     return Look(
         **{field.name: getattr(design, field.name) for field in fields(design)},
         growth=growth,

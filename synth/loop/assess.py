@@ -37,6 +37,7 @@ from .elements import (
     with_elements,
     without_losses,
 )
+from .loop_model import lively_poles, loop_model
 from .margins import Margins, least_distances, loop_margins, refine_minima
 from .pole_region import PoleRegion, with_delay_models
 from .responses import Closing, LoopBlocks, LoopResponses, blocks_with, with_loops
@@ -50,6 +51,7 @@ _NODE_ROUNDS = 6  # of finding nodes for losses
 _LOSS_ROUNDS, _LOSS_AGREES = 200, 1e-12  # of their coefficients on given nodes
 _SECANTS, _AGREED, _LONGEST = 25, 1e-12, 2.0  # steps, accuracy, longest step in logarithms
 _LEAST = -12.0  # logarithm of the share of its losses with which a stuck loop may move
+_DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 _VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
 
 Nodes = Callable[[ComplexArray], Quadrature]
@@ -131,13 +133,25 @@ class Assessment:
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles of the closed loop [1/s], delays as Pade models."""
+        """Poles of the closed loop [1/s], delays as Pade models.
+
+        Where nodes are made from them, without damped poles of the plant that no loop moves.
+        """
+        return self._every if self._nodes is None else self._lively(0)
+
+    @cached_property
+    def _every(self) -> ComplexArray:
         return closed_loop_poles(self._modelled[0], self.controller)
+
+    def _lively(self, side: int) -> ComplexArray:
+        """Return the poles that a loop moves, at one of the sides, on few states."""
+        model = loop_model(self._bare, self.elements)
+        return lively_poles(model, self.controller, self.elements, tuple(self._sides[side]))
 
     @cached_property
     def pole_region(self) -> PoleRegion:
         """Decay, damping and frequency of the closed loop's poles, without the delay models'."""
-        return PoleRegion.of(self.poles, self._modelled[1])
+        return PoleRegion.of(self._every, self._modelled[1])
 
     @cached_property
     def _modelled(self) -> tuple[LinearPlant, ComplexArray]:
@@ -151,9 +165,18 @@ class Assessment:
     @property
     def stable(self) -> bool:
         """Whether all poles lie in the left half plane, without losses too."""
-        still = self._plants[1:]
-        others = [closed_loop_poles(with_delay_models(p)[0], self.controller) for p in still]
-        return self.decays and all(poles.real.max(initial=-np.inf) < 0.0 for poles in others)
+        return self.decays and all(self._abscissa(k) < 0.0 for k in range(1, len(self._sides)))
+
+    @property
+    def held(self) -> bool:
+        """Whether the poles that a loop moves lie left of the axis by more than rounding."""
+        return all(self._abscissa(k) < -_DECAY for k in range(len(self._sides)))
+
+    def _abscissa(self, side: int) -> float:
+        """Return the largest real part of a lively pole over the size of the largest."""
+        poles = self._lively(side)
+        size = max(1.0, float(np.abs(poles).max(initial=1.0)))
+        return float(poles.real.max(initial=-1.0)) / size
 
     @cached_property
     def grid(self) -> FloatArray:
@@ -281,6 +304,14 @@ class Assessment:
     def spectrum(self, output: str, omega: FloatArray) -> FloatArray:
         """Return the one-sided density of `output` at `omega` [rad/s], (k,)."""
         return np.asarray(np.sum(self._spectra([output], omega)[0], axis=0), dtype=np.float64)
+
+    def curves(
+        self, output: str, disturbance: str, omega: FloatArray
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Return `response` to one of the disturbances that shake the plant, and `spectrum`."""
+        (responses,), shaken = self._all([output], omega)
+        names = [d.name for d in self.disturbances]
+        return responses[names.index(disturbance)], np.sum(np.abs(responses) ** 2 * shaken, axis=0)
 
     def quadrature(self, outputs: Sequence[str], rtol: float = _RTOL) -> Quadrature:
         """Return nodes on which the variance and the second moment of `outputs` are accurate."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,8 @@ from models.basics import ComplexArray, FloatArray
 from models.plant import LinearPlant
 
 from .controller import LinearController, closed_loop_matrix
+from .elements import Element
+from .pole_region import with_delay_models
 
 _DAMPED = 0.35  # damping ratio from which a mode may be left out
 _STILL = 1e-9  # size of a pole at zero, relative to the largest
@@ -117,6 +120,28 @@ class LoopModel:
 
     def _response(self, points: ComplexArray) -> ComplexArray:
         return np.asarray(self.C @ _solved(self.A, self.B, points))
+
+
+@lru_cache(maxsize=16)
+def loop_model(plant: LinearPlant, elements: tuple[Element, ...]) -> LoopModel:
+    """Return the model of a plant with delay models, its elements' loops open and the last."""
+    for element in elements:
+        plant = plant.opened(element.velocity, element.force)
+    return LoopModel.of(with_delay_models(plant)[0])
+
+
+@lru_cache(maxsize=64)
+def lively_poles(
+    model: LoopModel,
+    controller: LinearController,
+    elements: tuple[Element, ...],
+    coefficients: tuple[float, ...],
+) -> ComplexArray:
+    """Return the poles [1/s] of a loop around a `loop_model`, the same if asked again."""
+    gains = [e.reference - c for e, c in zip(elements, coefficients, strict=True)]
+    found = np.linalg.eigvals(model.closed(controller, gains)).astype(np.complex128)
+    found.setflags(write=False)
+    return found
 
 
 def _solved(A: FloatArray, B: FloatArray, points: npt.ArrayLike) -> ComplexArray:
