@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray, IndexArray, InputError
+from models.basics import ComplexArray, FloatArray, InputError
 from models.plant import MAX_MASSES, masses_for_bandwidth
 from models.sensing import sensed_line_at
 
@@ -31,9 +31,12 @@ _WEAK = 0.5  # loop gain below which S is at most 2, wherever a mode stands
 _NEAR = 0.1  # relative distance of peaks that are the same on masses and rope
 _KEPT = 1e-3  # relative excess on the rope as it is over a limit that its masses keep
 _RESERVED = 0.03  # ... that a limit may hold in reserve
+_NEARER = 0.8  # share of the step before, of a long one that is worth another
 _STEPS = 8  # of Newton's method towards a pole
 _FINE = 1e-7  # relative difference for a slope
 _SAME = 1e-6  # relative distance of poles that are one
+_PLACED = 0.05  # of its width, by which a pole may be off
+_UNFELT = 0.05  # peak of the loop gain below which a pole is not looked for
 _LIGHT = 0.3  # damping ratio above which a pole is no resonance
 
 
@@ -44,6 +47,8 @@ def masses_for(question: DesignQuestion, loop: Assessment) -> int:
     half has its place, and the margins that are kept are kept on that rope too, to a thousandth.
     Never fewer than the question's own.
     """
+    if question.masses == MAX_MASSES:
+        return MAX_MASSES
     return _masses(question, loop, _KEPT)[0]
 
 
@@ -102,10 +107,13 @@ class _OnTheRope:
         self.question, self.loop = question, loop
         self.drag, friction = question.equivalents(loop.coefficients)
         self.frictions = tuple(dict.fromkeys([friction, 0.0]))  # nothing may hang on the losses
+        lumped = np.concatenate([loop.plant.poles(), loop.poles])
+        lumped = lumped[(lumped.imag > 0.0) & (-lumped.real < _LIGHT * np.abs(lumped))]
+        self.begins: ComplexArray = np.concatenate([question.data.damped_modes(MAX_MASSES), lumped])
         poles = self._poles()
         omega, width = poles.imag, np.maximum(-poles.real, _NARROW * poles.imag)
         near = omega[:, None] + width[:, None] * np.array(_BESIDE)
-        low, high = 1e-3 * omega.min(), 2.0 * omega.max()
+        low, high = 1e-3 * self.begins.imag.min(), 2.0 * self.begins.imag.max()
         even = np.geomspace(low, high, int(_PER_DECADE * math.log10(high / low)))
         self.grid = np.unique(np.concatenate([even, near[near > 0.0]]))
         self.gains = self._gains(1j * self.grid)
@@ -189,24 +197,57 @@ class _OnTheRope:
         return np.asarray(LoopResponses.of(line, controller).difference(0) - 1.0), speed
 
     def _poles(self) -> ComplexArray:
-        """Return the light poles of the rope with the loop open and with it closed [1/s]."""
-        lumped = np.concatenate([self.loop.plant.poles(), self.loop.poles])
-        lumped = lumped[(lumped.imag > 0.0) & (-lumped.real < _LIGHT * np.abs(lumped))]
-        begins = np.concatenate([self.question.data.damped_modes(MAX_MASSES), lumped])
+        """Return the light poles of the rope with the loop open and closed [1/s], where L is felt.
+
+        Where they are looked for from is among them.
+        """
+        # Not at a pole that the controller has for itself, where its response has no value.
+        begins = self.begins * (1.0 + _SAME)
+        with np.errstate(all="ignore"):
+            move, slope = self._towards(begins, np.array(self.frictions)[:, None], 0.0)
+            # L has 1/slope for a residue there, and so much of a peak on the axis.
+            width = np.abs((begins - move).real)
+            felt = (np.abs(slope) * width < 1.0 / _UNFELT) | (np.abs(move) > _FAR * np.abs(begins))
+        begins = begins[felt.any(axis=0)]
         # Of each friction the open loop's, then the closed one's.
         closed = np.repeat(np.tile([0.0, 1.0], len(self.frictions)), begins.size)
         friction = np.repeat(self.frictions, 2 * begins.size)
-
-        def open_and_closed(s: ComplexArray, at: IndexArray) -> ComplexArray:
-            # 1/L and 1 + 1/L, which are smooth where L has a pole.
-            gain, turned = self._still(s)
-            return np.asarray((1.0 + friction[at] * turned) / gain + closed[at])
-
-        own = _zeros(open_and_closed, np.tile(begins, 2 * len(self.frictions)))
-        found = np.concatenate([begins, own])
+        s = np.tile(begins, 2 * len(self.frictions))
+        before, arrived = np.full(s.size, np.inf), [begins]
+        with np.errstate(all="ignore"):
+            for _ in range(_STEPS):
+                move, _ = self._towards(s, friction, closed)
+                size, whole = np.abs(move), np.abs(s)
+                s = s - move * np.minimum(1.0, _FAR * whole / size)
+                light = np.isfinite(s) & (s.imag > 0.0) & (np.abs(s.real) < _LIGHT * np.abs(s))
+                done = size < np.maximum(_SAME * np.abs(s), _PLACED * np.abs(s.real))
+                arrived.append(s[light & done])
+                # What is far and comes no nearer leads to a pole elsewhere, or to none.
+                left = light & ~done & ((size <= _FAR * whole) | (size < _NEARER * before))
+                before = size[left]
+                s, friction, closed = s[left], friction[left], closed[left]
+                if not s.size:
+                    break
+        found = np.concatenate(arrived)
         # Points about a pole that is there twice would lie apart by rounding only.
         same = np.abs(found[:, None] - found) < _SAME * np.abs(found)
         return np.asarray(found[~np.tril(same, -1).any(axis=1)])
+
+    def _towards(
+        self, s: ComplexArray, friction: FloatArray, closed: FloatArray | float
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return Newton's step back to where 1/L, plus 1 where closed, vanishes, and its slope.
+
+        These are smooth where L has a pole.
+        """
+        step = _FINE * np.abs(s)
+        gain, turned = self._still(np.concatenate([s, s + step]))
+        value, beside = (
+            (1.0 + friction * turned[part]) / gain[part] + closed
+            for part in (slice(s.size), slice(s.size, None))
+        )
+        slope = (beside - value) / step
+        return value / slope, slope
 
 
 def on_enough_masses(
@@ -223,21 +264,27 @@ def on_enough_masses(
     part of its poles [1/s] with the drag before compensation.
     """
     values = question.values(parameters)
-    growth = question.problem.growth(values)
+    growth = _growth(question, values)
     if growth > 0.0 and question.masses < MAX_MASSES and question.data.masses is None:
         # Few masses do not have their modes where the rope does: made on it, a loop may hold there.
         most = finer(question, MAX_MASSES)
-        if (there := most.problem.growth(values)) <= 0.0:
+        if (there := _growth(most, values)) <= 0.0:
             question, growth = most, there
     while growth <= 0.0:
         loop = assess(question, values)
-        if loop is None or not question.problem.held(values, loop.coefficients):
+        if loop is None or not loop.held:
             break
         if (masses := masses_for(question, loop)) <= question.masses:
             return question, loop, growth
         question = finer(question, masses)
-        growth = question.problem.growth(values)
+        growth = _growth(question, values)
     return question, None, growth
+
+
+def _growth(question: DesignQuestion, values: Values) -> float:
+    """Return the largest real part of a pole that the loop moves [1/s], with the drag before."""
+    poles = next(question.problem.lively_poles(values, None))
+    return float(poles.real.max(initial=-np.inf))
 
 
 def on_common_masses(
@@ -271,30 +318,3 @@ def _least(limit: Limit, peak: float) -> float:
     if isinstance(limit, GainMargin):
         return reach
     return peak / (peak + 1.0) if isinstance(limit, GainMarginDown) else 0.0
-
-
-def _zeros(
-    function: Callable[[ComplexArray, IndexArray], ComplexArray], begins: ComplexArray
-) -> ComplexArray:
-    """Return light zeros [1/s] that Newton's method finds, each of its own analytic function.
-
-    The function takes points, and of which beginning each is.
-    """
-    # Not at a pole that the controller has for itself, where its response has no value.
-    s, at = begins * (1.0 + _SAME), np.arange(begins.size)
-    arrived: list[ComplexArray] = [begins[:0]]
-    with np.errstate(all="ignore"):
-        for _ in range(_STEPS):
-            step = _FINE * np.abs(s)
-            both = function(np.concatenate([s, s + step]), np.concatenate([at, at]))
-            value, beside = both[: s.size], both[s.size :]
-            move = value * step / (beside - value)
-            far = np.abs(move) > _FAR * np.abs(s)
-            s = s - np.where(far, _FAR * np.abs(s) * move / np.abs(move), move)
-            light = np.isfinite(s) & (s.imag > 0.0) & (np.abs(s.real) < _LIGHT * np.abs(s))
-            done = np.abs(move) < _SAME * np.abs(s)
-            arrived.append(s[light & done])
-            s, at = s[light & ~done], at[light & ~done]
-            if not s.size:
-                break
-    return np.concatenate(arrived)
