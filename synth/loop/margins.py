@@ -62,14 +62,16 @@ def loop_margins(
     grid: FloatArray,
     gains: ComplexArray,
     minima: Sequence[Sequence[tuple[FloatArray, FloatArray]]] | None = None,
+    error: float = 0.0,
 ) -> Margins:
     """Return the margins of `loops`(omega) -> L, known as `gains` on a grid [rad/s].
 
     L is (k,), or (n, k) of n loops, of which the worst of each figure is told.  `minima` are their
-    `least_distances`, where they are known already.
+    `least_distances`, where they are known already; the relative error that may be left is by
+    default that of rounding.
     """
     gains = np.atleast_2d(gains)
-    count, known = len(gains), minima or least_distances(loops, grid, gains)
+    count, known = len(gains), minima or least_distances(loops, grid, gains, error)
 
     def heights(at: ComplexArray) -> FloatArray:
         return np.concatenate([np.abs(at) - 1.0, at.imag])
@@ -79,7 +81,8 @@ def loop_margins(
     gains = np.concatenate([gains, np.atleast_2d(loops(turns))], axis=1)[:, order]
     felt = np.abs(gains) > _NOTHING
     among = np.concatenate([np.ones_like(felt), felt])
-    places = _crossings(lambda w: heights(np.atleast_2d(loops(w))), grid, heights(gains), among)
+    known_there = grid, heights(gains), among, max(error, _CLOSE)
+    places = _crossings(lambda w: heights(np.atleast_2d(loops(w))), *known_there)
     for i in range(count):
         places[count + i] = np.append(places[count + i], grid[[0, -1]][level_ends(gains[i])])
     # All loops where any of them is asked for.
@@ -137,7 +140,7 @@ def worst_margins(margins: list[Margins]) -> Margins:
 
 
 def least_distances(
-    loops: LoopGain, grid: FloatArray, gains: ComplexArray
+    loops: LoopGain, grid: FloatArray, gains: ComplexArray, error: float = 0.0
 ) -> list[list[tuple[FloatArray, FloatArray]]]:
     """Return places and values of the local minima of |1 + L| and of 1/|S - 1/2| of each loop.
 
@@ -155,7 +158,8 @@ def least_distances(
     high = np.tile([[_FLAT], [0.0]], (1, len(gains))).reshape(-1, 1)
     worth = on_grid < np.maximum(_HIGHER * on_grid.min(axis=1, keepdims=True), high)
     worth &= np.tile(np.abs(gains) > _NOTHING, (2, 1))
-    found = _all_minima(lambda w: distances(np.atleast_2d(loops(w))), grid, on_grid, worth)
+    known = grid, on_grid, worth, max(error, _RESOLVED)
+    found = _all_minima(lambda w: distances(np.atleast_2d(loops(w))), *known)
     return [[found[i], found[len(gains) + i]] for i in range(len(gains))]
 
 
@@ -178,6 +182,7 @@ def _all_minima(
     grid: FloatArray,
     values: FloatArray,
     among: BoolArray | None,
+    close: float = _RESOLVED,
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Return `refine_minima` of each of several functions, (f, k), that are evaluated together.
 
@@ -192,7 +197,7 @@ def _all_minima(
     best, at = values[which, inner], grid[inner]
     low, high = grid[inner - 1], grid[inner + 1]
     ends = np.stack([values[which, inner - 1], values[which, inner + 1]])
-    sought = np.arange(inner.size)
+    sought, stuck = np.arange(inner.size), np.zeros(inner.size, np.bool_)
     for _ in range(_ROUNDS):
         if not sought.size:
             break
@@ -214,14 +219,14 @@ def _all_minima(
         low[sought], high[sought] = nodes[rows, left], nodes[rows, right]
         ends[:, sought] = inside[rows, left], inside[rows, right]
         place, least, error = _vertex(inside)
-        resolved = error <= _RESOLVED * np.abs(best[sought])
+        resolved = error <= close * np.abs(best[sought])
         done = sought[resolved]
         at[done] = nodes[resolved, 0] + width[resolved] * place[resolved]
         best[done] = np.minimum(best[done], least[resolved])
         # At an edge of the function the grid's own point stays the best.
-        if np.all(resolved | ~better):
-            break
-        sought = sought[~resolved]
+        edge = ~better & stuck[sought]
+        stuck[sought] = ~better
+        sought = sought[~resolved & ~edge]
     rest = lower & level
     found = []
     for i, own in enumerate(values):
@@ -301,6 +306,7 @@ def _crossings(
     grid: FloatArray,
     values: FloatArray,
     among: BoolArray,
+    close: float,
 ) -> list[FloatArray]:
     """Return where several functions, (f, k), change their sign between grid points, of each.
 
@@ -335,8 +341,8 @@ def _crossings(
         line = a + (b - a) * f_low[sought] / (f_low[sought] - f_high[sought])
         inside = (a <= guess) & (guess <= b)
         place[sought] = np.where(inside, guess, line)
-        hair[sought] = np.where(inside, np.maximum(error, _CLOSE * b), _HAIR * (b - a))
-        there = (inside & (error <= _CLOSE * b)) | (b - a <= _CLOSE * b)
+        hair[sought] = np.where(inside, np.maximum(error, close * b), _HAIR * (b - a))
+        there = (inside & (error <= close * b)) | (b - a <= close * b)
         sought = sought[~there]
     return [place[which == i] for i in range(len(values))]
 
