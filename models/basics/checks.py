@@ -84,8 +84,9 @@ def check_finite(owner: str, name: str, values: npt.ArrayLike) -> FloatArray:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{owner}: {name} must be numbers, got {values!r}") from error
-    bad = np.argwhere(~np.isfinite(array))
-    if bad.size:
+    finite = np.isfinite(array)
+    if not finite.all():
+        bad = np.argwhere(~finite)
         where = ", ".join(str(int(i)) for i in bad[0])
         raise InputError(
             f"{owner}: {name} must be finite numbers, got {array[tuple(bad[0])]} at index {where}"

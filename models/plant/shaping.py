@@ -17,12 +17,14 @@ of the waves.  White noise has intensity one, a one-sided density of 1/pi.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from ..basics import ComplexArray, FloatArray, InputError, ReadOnlyArrays, SolverError
+from .resolvent import Resolvent, Transfer
 
 _NODES = 240
 _TAIL_WEIGHT = 0.03  # of the tail's logarithm against the amplitude
@@ -55,13 +57,14 @@ class ShapingFilter(ReadOnlyArrays):
 
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the one-sided density of the fitted spectrum per rad/s at `omega` [rad/s]."""
-        s = 1j * np.asarray(omega, dtype=np.float64).reshape(-1)
-        states = np.linalg.solve(
-            s[:, None, None] * np.eye(self.order) - self.A,
-            np.broadcast_to(self.B.astype(np.complex128), (s.size, self.order, 1)),
-        )
-        gain = (self.C @ states)[:, 0, 0]
+        s = 1j * np.asarray(omega, dtype=np.complex128).reshape(-1)
+        gain = self._gain(s)
+        assert gain is not None  # the filter is stable
         return np.asarray((np.abs(gain) ** 2 / np.pi).reshape(np.shape(omega)))
+
+    @cached_property
+    def _gain(self) -> Transfer:
+        return Resolvent(self.A).between(self.C, self.B)
 
 
 def fit_shaping_filter(

@@ -51,6 +51,7 @@ _NODE_ROUNDS = 6  # of finding nodes for losses
 _LOSS_ROUNDS, _LOSS_AGREES = 200, 1e-12  # of their coefficients on given nodes
 _SECANTS, _AGREED, _LONGEST = 25, 1e-12, 2.0  # steps, accuracy, longest step in logarithms
 _LEAST = -12.0  # logarithm of the share of its losses with which a stuck loop may move
+_GLANCED = 1e-8  # relative error of margins where nodes are made from poles
 _DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 _VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
 
@@ -189,7 +190,7 @@ class Assessment:
     @cached_property
     def margins(self) -> Margins:
         """Margins of the loops broken at the inputs."""
-        return loop_margins(self._gains, self.grid, self.gains, self._minima)
+        return loop_margins(self._gains, self.grid, self.gains, self._minima, self._error)
 
     @cached_property
     def gains(self) -> ComplexArray:
@@ -199,7 +200,12 @@ class Assessment:
     @cached_property
     def _minima(self) -> list[list[tuple[FloatArray, FloatArray]]]:
         """Places and values of the local minima of |1 + L| and of 1/|S - 1/2| of each loop."""
-        return least_distances(self._gains, self.grid, self.gains)
+        return least_distances(self._gains, self.grid, self.gains, self._error)
+
+    @property
+    def _error(self) -> float:
+        """The relative error that margins may have: none but rounding if nodes adapt."""
+        return 0.0 if self._nodes is None else _GLANCED
 
     @property
     def max_sensitivity(self) -> float:

@@ -29,6 +29,7 @@ _FAR = 0.1  # relative length of the longest step
 _FELT = 0.15  # loop gain below which no margin is looked for
 _WEAK = 0.5  # loop gain below which S is at most 2, wherever a mode stands
 _NEAR = 0.1  # relative distance of peaks that are the same on masses and rope
+_READ = 1e-6  # relative error of the margins on the rope
 _KEPT = 1e-3  # relative excess on the rope as it is over a limit that its masses keep
 _RESERVED = 0.03  # ... that a limit may hold in reserve
 _NEARER = 0.8  # share of the step before, of a long one that is worth another
@@ -107,7 +108,7 @@ class _OnTheRope:
         self.question, self.loop = question, loop
         self.drag, friction = question.equivalents(loop.coefficients)
         self.frictions = tuple(dict.fromkeys([friction, 0.0]))  # nothing may hang on the losses
-        lumped = np.concatenate([loop.plant.poles(), loop.poles])
+        lumped = np.concatenate([question.plant.poles(), loop.poles])
         lumped = lumped[(lumped.imag > 0.0) & (-lumped.real < _LIGHT * np.abs(lumped))]
         self.begins: ComplexArray = np.concatenate([question.data.damped_modes(MAX_MASSES), lumped])
         poles = self._poles()
@@ -140,8 +141,8 @@ class _OnTheRope:
         kept = all(limit.use(_least(limit, peak)) <= 1.0 for limit in limits)
         if (binding or not kept) and felt.any():
             grid, gains = self.grid[felt], self.gains[:, felt]
-            minima = least_distances(self._loops, grid, gains)
-            own = loop_margins(self._loops, grid, gains, minima)
+            minima = least_distances(self._loops, grid, gains, _READ)
+            own = loop_margins(self._loops, grid, gains, minima, _READ)
             seen = _Seen(max_sensitivity=own.max_sensitivity, margins=own)
             for limit in limits:
                 found[limit.name] = limit.use(limit.measure(seen))  # type: ignore[arg-type]
