@@ -75,7 +75,7 @@ def build_equations(
     symbols = ca.SX.sym("p", len(parameters))
     p = {name: symbols[i] for i, name in enumerate(parameters)}
 
-    states = _state_names(data, n)
+    states = state_names(data, n)
     x = ca.SX.sym("x", len(states))
     x_of = {name: x[i] for i, name in enumerate(states)}
     u = ca.SX.sym("u", len(INPUTS))
@@ -275,7 +275,8 @@ def _branch_names(piece: int, branches: int) -> list[str]:
     return [f"rope.{piece + 1}.branch_{b + 1}.stretch" for b in range(branches)]
 
 
-def _state_names(data: PlantData, n: int) -> tuple[str, ...]:
+def state_names(data: PlantData, n: int) -> tuple[str, ...]:
+    """Return the names of the states of a plant with n masses along the rope."""
     names = ["motor.angle", "motor.speed"]
     if data.motor == "dc" and data.inductance > 0.0:
         names.append("motor.current")

@@ -21,7 +21,8 @@ Limits of the drive, a rope that grows, a seabed or a deck are no part of it unl
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,15 @@ import casadi as ca
 import numpy as np
 
 from ..basics import FloatArray, SolverError, check_range, pick, read_only
-from .equations import RATES, Equations, build_equations, displacement_names, weighed_tension
+from .equations import (
+    RATES,
+    Equations,
+    build_equations,
+    displacement_names,
+    parameter_values,
+    state_names,
+    weighed_tension,
+)
 from .linear import LinearPlant
 from .plant_data import PlantData, as_plant_data
 from .rope import Link, chain_of, lump_rope
@@ -117,13 +126,7 @@ class Plant(Equations):
         p = self.parameter_vector({"winch.gear_direction": 1.0, **(parameters or {})})
         values = dict(zip(self.parameters, p, strict=True))
         nx = len(self.states)
-        unknown = ca.SX.sym("unknown", nx)  # the state but for the angle, and the command
-        x = ca.vertcat(0, unknown[: nx - 1])
-        symbols = ca.SX.sym("p", p.size)
-        xdot = self.function(x, unknown[nx - 1], np.zeros(len(self.disturbances)), symbols)[0]
-        # The angle's own equation says that the speed is zero; all nx are kept.
-        system = {"x": unknown, "p": symbols, "g": xdot}
-        solver = ca.rootfinder("static", "newton", system, _QUIET)
+        solver = _at_rest(self.function)
         links = chain_of(values, self.lumps, values["rope.length"])
         stretch = np.array([link.carried / link.series for link in links])
         start = np.zeros(nx)
@@ -239,6 +242,41 @@ def build_plant(
         If `masses` is out of range, or the drum does not hold the rope that is paid out.
     """
     data = as_plant_data(source)
-    lumps = lump_rope(data.chosen_masses(masses), data.lumping)
-    made = build_equations(data, lumps, limits=limits, travel=travel, surroundings=surroundings)
+    masses, values = data.chosen_masses(masses), parameter_values(data)
+    if limits is None and travel is None and surroundings is None:
+        names = tuple(values), state_names(data, masses)
+        alike = masses, data.lumping, *names, data.falls, data.friction_speed
+        made = replace(_equations(_Kind(alike=alike, data=data)), data=data, parameters=values)
+    else:
+        lumps = lump_rope(masses, data.lumping)
+        made = build_equations(data, lumps, limits=limits, travel=travel, surroundings=surroundings)
     return Plant(**vars(made))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Kind:
+    """What plants have in common whose equations differ in the values of parameters only."""
+
+    #: Masses, names of parameters and states, and the numbers that are in the equations.
+    alike: tuple[object, ...]
+    data: PlantData = field(compare=False)
+
+
+@lru_cache(maxsize=32)
+def _equations(kind: _Kind) -> Equations:
+    """Return the equations of plants of a kind, with the numbers of the first that asked."""
+    data, (masses, *_) = kind.data, kind.alike
+    assert isinstance(masses, int)
+    return build_equations(data, lump_rope(masses, data.lumping))
+
+
+@lru_cache(maxsize=32)
+def _at_rest(function: ca.Function) -> ca.Function:
+    """Return Newton's method for a plant's state but for its angle, and the command, at rest."""
+    nx, _, nw, size = (function.size1_in(i) for i in range(4))
+    unknown, symbols = ca.SX.sym("unknown", nx), ca.SX.sym("p", size)
+    x = ca.vertcat(0, unknown[: nx - 1])
+    xdot = function(x, unknown[nx - 1], np.zeros(nw), symbols)[0]
+    # The angle's own equation says that the speed is zero; all nx are kept.
+    system = {"x": unknown, "p": symbols, "g": xdot}
+    return ca.rootfinder("static", "newton", system, _QUIET)
