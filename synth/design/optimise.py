@@ -357,7 +357,7 @@ def evaluated(
         return recorded(question, parameters, None, {}, ok=False, status=status)
     uses = every_use(question, assessment, prices or {})
     broken = [u.name for u in uses.values() if u.enforced and not u.kept]
-    swings = question.problem.swings(question.values(parameters))
+    swings = assessment.swings
     how = "unstable in small motion, where drag vanishes: it swings by itself" if swings else how
     status = f"{how}; " + (f"breaks {', '.join(broken)}" if broken else "keeps every limit")
     ok = not (broken or swings)

@@ -37,7 +37,7 @@ from .elements import (
     with_elements,
     without_losses,
 )
-from .loop_model import lively_poles, loop_model
+from .loop_model import lively_poles
 from .margins import Margins, least_distances, loop_margins, refine_minima
 from .pole_region import PoleRegion, with_delay_models
 from .responses import Closing, LoopBlocks, LoopResponses, blocks_with, with_loops
@@ -138,16 +138,15 @@ class Assessment:
 
         Where nodes are made from them, without damped poles of the plant that no loop moves.
         """
-        return self._every if self._nodes is None else self._lively(0)
+        return self._every if self._nodes is None else self._lively(self.coefficients)
 
     @cached_property
     def _every(self) -> ComplexArray:
         return closed_loop_poles(self._modelled[0], self.controller)
 
-    def _lively(self, side: int) -> ComplexArray:
-        """Return the poles that a loop moves, at one of the sides, on few states."""
-        model = loop_model(self._bare, self.elements)
-        return lively_poles(model, self.controller, self.elements, tuple(self._sides[side]))
+    def _lively(self, coefficients: Coefficients) -> ComplexArray:
+        """Return the poles that a loop moves, on few states."""
+        return lively_poles(self._bare, self.controller, self.elements, tuple(coefficients))
 
     @cached_property
     def pole_region(self) -> PoleRegion:
@@ -166,16 +165,22 @@ class Assessment:
     @property
     def stable(self) -> bool:
         """Whether all poles lie in the left half plane, without losses too."""
-        return self.decays and all(self._abscissa(k) < 0.0 for k in range(1, len(self._sides)))
+        return self.decays and all(self._abscissa(side) < 0.0 for side in self._sides[1:])
 
     @property
     def held(self) -> bool:
         """Whether the poles that a loop moves lie left of the axis by more than rounding."""
-        return all(self._abscissa(k) < -_DECAY for k in range(len(self._sides)))
+        return all(self._abscissa(side) < -_DECAY for side in self._sides)
 
-    def _abscissa(self, side: int) -> float:
+    @property
+    def swings(self) -> bool:
+        """Whether it swings by itself in small motion, where quadratic drag vanishes."""
+        dragged = any(element.lasting for element in self.elements)
+        return dragged and self._abscissa([0.0] * len(self.elements)) > _DECAY
+
+    def _abscissa(self, coefficients: Coefficients) -> float:
         """Return the largest real part of a lively pole over the size of the largest."""
-        poles = self._lively(side)
+        poles = self._lively(coefficients)
         size = max(1.0, float(np.abs(poles).max(initial=1.0)))
         return float(poles.real.max(initial=-1.0)) / size
 

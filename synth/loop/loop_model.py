@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
 from models.basics import ComplexArray, FloatArray
@@ -88,13 +87,17 @@ class LoopModel:
             return self
         A1, A2 = T[:n, :n], T[n:, n:]
         B, C = Q.T @ (self.B / scale[:, None]), (self.C * scale) @ Q
-        beside = scipy.linalg.solve_sylvester(A1, -A2, -T[:n, n:])
+        beside, shrunk, fault = scipy.linalg.lapack.dtrsyl(A1, A2, -T[:n, n:], isgn=-1)
+        if fault:
+            return self
+        beside /= shrunk
         B1, B2, C1, C2 = B[:n] - beside @ B[n:], B[n:], C[:, :n], C[:, n:] + C[:, :n] @ beside
-        sizes = np.abs(np.linalg.eigvals(A2))
+        triangle, turn = scipy.linalg.rsf2csf(A2, np.eye(len(A2)))
+        sizes = np.abs(triangle.diagonal())
         low, high = sizes.min() / _BEYOND, sizes.max() * _BEYOND
         omega = np.geomspace(low, high, 1 + int(_PER_DECADE * np.log10(high / low)))
-        reached = _factor(A2, B2 / _sizes(B), omega)
-        heard = _factor(A2.T, (C2.T / _sizes(C.T)), omega)
+        reached = _factor(triangle, turn, B2 / _sizes(B), omega)
+        heard = _factor(triangle.T, turn.conj(), C2.T / _sizes(C.T), omega)
         U, seen, V = np.linalg.svd(heard.T @ reached)
         kept = int(np.count_nonzero(seen > _SEEN * seen[0]))
         root = np.sqrt(seen[:kept])
@@ -119,11 +122,13 @@ class LoopModel:
         return bool(np.all((error <= _ALIKE * size) | (size == 0.0)))
 
     def _response(self, points: ComplexArray) -> ComplexArray:
-        return np.asarray(self.C @ _solved(self.A, self.B, points))
+        inside = np.multiply.outer(points, np.eye(len(self.A))) - self.A
+        states = np.linalg.solve(inside, np.broadcast_to(self.B, (points.size, *self.B.shape)))
+        return np.asarray(self.C @ states)
 
 
 @lru_cache(maxsize=16)
-def loop_model(plant: LinearPlant, elements: tuple[Element, ...]) -> LoopModel:
+def _loop_model(plant: LinearPlant, elements: tuple[Element, ...]) -> LoopModel:
     """Return the model of a plant with delay models, its elements' loops open and the last."""
     for element in elements:
         plant = plant.opened(element.velocity, element.force)
@@ -132,30 +137,33 @@ def loop_model(plant: LinearPlant, elements: tuple[Element, ...]) -> LoopModel:
 
 @lru_cache(maxsize=64)
 def lively_poles(
-    model: LoopModel,
+    plant: LinearPlant,
     controller: LinearController,
     elements: tuple[Element, ...],
     coefficients: tuple[float, ...],
 ) -> ComplexArray:
-    """Return the poles [1/s] of a loop around a `loop_model`, the same if asked again."""
+    """Return the closed loop's poles [1/s], without damped ones of the plant that no loop moves."""
     gains = [e.reference - c for e, c in zip(elements, coefficients, strict=True)]
-    found = np.linalg.eigvals(model.closed(controller, gains)).astype(np.complex128)
+    closed = _loop_model(plant, elements).closed(controller, gains)
+    found = np.linalg.eigvals(closed).astype(np.complex128)
     found.setflags(write=False)
     return found
 
 
-def _solved(A: FloatArray, B: FloatArray, points: npt.ArrayLike) -> ComplexArray:
-    """Return (s I - A)^-1 B at points s, (k, n, columns)."""
-    inside = np.multiply.outer(points, np.eye(len(A))) - A
-    found = np.linalg.solve(inside, np.broadcast_to(B, (len(inside), *B.shape)))
-    return np.asarray(found, dtype=np.complex128)
+def _factor(T: ComplexArray, Q: ComplexArray, B: FloatArray, omega: FloatArray) -> FloatArray:
+    """Return Z with Z Z^T near the Gramian of Q T Q^H and B, by its integral over log frequency.
 
-
-def _factor(A: FloatArray, B: FloatArray, omega: FloatArray) -> FloatArray:
-    """Return Z with Z Z^T near the Gramian of A and B, by its integral over log frequency."""
-    through = _solved(A, B, 1j * omega) * np.sqrt(omega)[:, None, None]
+    T is triangular, Q unitary, and their product is real.
+    """
+    lower = not np.any(np.triu(T, 1))
+    inside, turned = -T, Q.conj().T @ B
+    through = np.empty((len(omega), *B.shape), np.complex128)
+    for states, at in zip(through, omega, strict=True):
+        np.fill_diagonal(inside, 1j * at - T.diagonal())
+        states[:] = scipy.linalg.solve_triangular(inside, turned, lower=lower, check_finite=False)
+    through = Q @ through * np.sqrt(omega)[:, None, None]
     both = np.concatenate([through.real, through.imag], axis=2)
-    return np.asarray(both.transpose(1, 0, 2).reshape(len(A), -1))
+    return np.asarray(both.transpose(1, 0, 2).reshape(len(T), -1))
 
 
 def _sizes(B: FloatArray) -> FloatArray:

@@ -17,7 +17,14 @@ from models.plant import MAX_MASSES, masses_for_bandwidth
 from models.sensing import sensed_line_at
 
 from ..limits import DelayMargin, GainMargin, GainMarginDown, Limit, MaxSensitivity
-from ..loop import Assessment, LoopResponses, Margins, least_distances, loop_margins
+from ..loop import (
+    Assessment,
+    LoopResponses,
+    Margins,
+    least_distances,
+    lively_poles,
+    loop_margins,
+)
 from .problem import Values
 from .question import DesignQuestion, with_masses
 
@@ -284,7 +291,9 @@ def on_enough_masses(
 
 def _growth(question: DesignQuestion, values: Values) -> float:
     """Return the largest real part of a pole that the loop moves [1/s], with the drag before."""
-    poles = next(question.problem.lively_poles(values, None))
+    references = tuple(element.reference for element in question.elements)
+    controller = question.law.controller([float(v) for v in values])
+    poles = lively_poles(question.plant, controller, question.elements, references)
     return float(poles.real.max(initial=-np.inf))
 
 
