@@ -282,24 +282,24 @@ def _measure(
             "quadrature: the integrand must be finite, "
             f"got {values[tuple(bad[0])]} at {omega[bad[0][1]]:.6g} rad/s"
         )
-    panels, start = [], 0
-    for (a, b, rung, previous), count in zip(wanted, counts, strict=True):
-        own = slice(start, start + count)
-        start += count
-        integral = values[:, own] @ weights[own]
-        panels.append(
-            _Panel(
-                a=a,
-                b=b,
-                rung=rung,
-                omega=omega[own],
-                weights=weights[own],
-                integral=integral,
-                modulus=np.abs(values[:, own]) @ weights[own],
-                error=np.abs(integral - (0.0 if previous is None else previous)),
-            )
+    first = np.cumsum([0, *counts[:-1]])
+    integrals = np.add.reduceat(values * weights, first, axis=1).T
+    moduli = np.add.reduceat(np.abs(values) * weights, first, axis=1).T
+    return [
+        _Panel(
+            a=a,
+            b=b,
+            rung=rung,
+            omega=omega[start : start + count],
+            weights=weights[start : start + count],
+            integral=integral,
+            modulus=modulus,
+            error=np.abs(integral - (0.0 if previous is None else previous)),
         )
-    return panels
+        for (a, b, rung, previous), start, count, integral, modulus in zip(
+            wanted, first, counts, integrals, moduli, strict=True
+        )
+    ]
 
 
 def _real(values: npt.ArrayLike) -> FloatArray:

@@ -92,13 +92,13 @@ def prepare(
 class View:
     """A case, others like it if there are any, and a structure, prepared for many looks.
 
-    `posed` has the questions of all members, on the rope masses that their cases ask for; `begin`
-    has coefficients of each member's elements to begin with.
+    `posed` has the questions of all members, on the rope masses that their cases ask for; what was
+    kept of each member `before` is kept where it is the same.
     """
 
-    def __init__(self, posed: PosedFamily, begin: Sequence[Coefficients | None] = ()) -> None:
+    def __init__(self, posed: PosedFamily, before: Sequence[_Member] = ()) -> None:
         self.posed = posed
-        known = [*begin, *[None] * (len(posed.questions) - len(begin))]
+        known = [*before, *[None] * (len(posed.questions) - len(before))]
         each = zip(posed.questions, known, strict=False)
         self._members = [_Member(*one) for one in each]
         self._problems: dict[tuple[int, ...], FamilyProblem] = {}
@@ -139,7 +139,7 @@ class View:
         first, *others = (question.case.replace(dict(changes)) for question in given)
         objective = self.posed.objective
         posed = pose_family(first, others, self.structure, objective=objective, known=self.posed)
-        return View(posed, [member.begin for member in self._members])
+        return View(posed, self._members)
 
     @one_thread()
     def optimise(self, start: object = None, *, verify: bool = False) -> Design:
@@ -267,9 +267,14 @@ class View:
 class _Member:
     """One member's loop, with what is kept from one look to the next."""
 
-    def __init__(self, question: DesignQuestion, begin: Coefficients | None) -> None:
-        self.question, self.begin = question, begin
+    def __init__(self, question: DesignQuestion, before: _Member | None) -> None:
+        self.question = question
+        self.begin: Coefficients | None = None if before is None else before.begin
         self._posed = {question.masses: question}
+        self._known: dict[int, DesignQuestion] = {}
+        if before is not None and before.question.plant is question.plant:
+            # On more masses the plant is the same, too.
+            self._known = {**before._known, **before._posed}
 
     def loop(
         self, parameters: Mapping[str, float], masses: int
@@ -283,7 +288,7 @@ class _Member:
     def on(self, question: DesignQuestion, masses: int) -> DesignQuestion:
         """Return the question on some rope masses, posed once."""
         if masses not in self._posed:
-            self._posed[masses] = with_masses(question, masses)
+            self._posed[masses] = with_masses(question, masses, self._known.get(masses))
         return self._posed[masses]
 
     def assessed(

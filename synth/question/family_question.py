@@ -62,7 +62,7 @@ class FamilyQuestion:
         """The largest number of rope masses of any case posed so far."""
         return max([self.nominal.masses, *(q.masses for q in self._posed.values())])
 
-    def question(self, case: Case, known: DesignQuestion | None = None) -> DesignQuestion:
+    def question(self, case: Case, known: Sequence[DesignQuestion] = ()) -> DesignQuestion:
         """Return the question of a case like this one; what is `known` as `pose` takes it."""
         if case not in self._posed:
             posed = pose(case, self.structure, self.masses, known, built_for=self.case)
@@ -205,7 +205,9 @@ def pose_family(
     posed = FamilyQuestion(case, structure, masses)
     alike: list[DesignQuestion | None] = [] if known is None else [*known.questions]
     alike += [None] * (len(cases) - len(alike))
-    questions = map(posed.question, cases, alike)
+    questions: list[DesignQuestion] = []
+    for one, like in zip(cases, alike, strict=False):
+        questions.append(posed.question(one, [q for q in (like, *questions) if q is not None]))
     return PosedFamily(
         questions=tuple(replace(question, held=dict(held or {})) for question in questions),
         names=(case.name, *(difference_text(case, one) for one in cases[1:])),

@@ -225,7 +225,7 @@ def pose(
     case: Case,
     structure: str = "payload-feedback",
     masses: int | None = None,
-    known: DesignQuestion | None = None,
+    known: Sequence[DesignQuestion] = (),
     *,
     built_for: Case | None = None,
 ) -> DesignQuestion:
@@ -235,7 +235,7 @@ def pose(
     ship: for it the limit on slow motion is reported only.
 
     `masses` along the rope are by default the case's, or a number that suits a quick loop.  What
-    the question has in common with that of a similar case, `known`, is taken from there.  The
+    the question has in common with those of similar cases, `known`, is taken from there.  The
     structure, named as in `synth.structures.structure_names`, is built for the motor, the drum and
     the gains of the case, or of `built_for`.
 
@@ -245,17 +245,23 @@ def pose(
     named = structure_aboard(structure, built_for or case)
     _warn_of_waves(case, named.measurements)
     data = PlantData.from_case(case)
-    shaken = known if known is not None and _same_sea(case, known.case) else None
-    hook = HookMotion.from_case(case) if shaken is None else shaken.hook
-    if known is not None and known.data == data and masses in (None, known.masses):
-        model = known.model
+    alike = [one for one in known if one.data == data and masses in (None, one.masses)]
+    shaken = [one for one in known if _same_sea(case, one.case)]
+    hook = shaken[0].hook if shaken else HookMotion.from_case(case)
+    model = alike[0].model if alike else build_plant(data, masses)
+    held = [one for one in shaken if one.data == data and one.case.payload == case.payload]
+    if held:
+        drag_before, rms_before = held[0].drag_before, held[0].payload_rms_before
     else:
-        model = build_plant(data, masses)
-    if shaken is not None and shaken.data == data and case.payload == shaken.case.payload:
-        drag_before, rms_before = shaken.drag_before, shaken.payload_rms_before
-    else:
-        drag_before, rms_before = uncompensated(case, data, hook)
-    plant = loaded_plant(case, data, model, drag_before, named.measurements)
+        near = known[0].drag_before if known else 0.0
+        drag_before, rms_before = uncompensated(case, data, hook, near)
+    heard = drag_before, case.sensors, named.measurements
+    plants = [
+        one.plant
+        for one in alike
+        if (one.drag_before, one.case.sensors, one.structure.measurements) == heard
+    ]
+    plant = plants[0] if plants else loaded_plant(case, data, model, drag_before, heard[-1])
     elements = equivalent_elements(case, data, hook, plant, drag_before)
     loop = loop_limits(case, data, model.masses)
     slow = [lim for lim in loop if isinstance(lim, LowFrequency) and not named.hears_payload]
@@ -391,35 +397,60 @@ def _sampled(spectrum: Any) -> SampledNoise:
     return SampledNoise(spectrum=getattr(spectrum, "density", spectrum))
 
 
-def uncompensated(case: Case, data: PlantData, hook: HookMotion) -> tuple[float, float]:
+def uncompensated(
+    case: Case, data: PlantData, hook: HookMotion, near: float = 0.0
+) -> tuple[float, float]:
     """Return drag coefficient [N s/m] and rms payload motion [m] with the drum held.
 
     On the exact distributed rope (the lumped one spring with the thesis's lumping); drag that
-    is stochastically linearised agrees with the motion.
+    is stochastically linearised agrees with the motion.  It is looked for `near` a value, if given.
     """
 
-    def moved(C: float, omega: FloatArray) -> FloatArray:
-        P_Y = held_transfers(data, np.asarray(1j * omega, dtype=np.complex128), C)[0]
-        return np.asarray(np.abs(P_Y) ** 2)
-
-    def about(C: float, power: int) -> Callable[[float], float]:
+    def about(C: float) -> Callable[[float], tuple[float, float]]:
+        """Return a function of the drag to rms motion and velocity, on nodes that suit one."""
         poles = held_poles(data, C, hook.band[1])
         if poles[0].real >= 0.0:
-            return lambda C: math.inf  # undamped resonance: no stationary motion
+            return lambda other: (math.inf, math.inf)  # undamped resonance: no stationary motion
+
+        def responses(omega: FloatArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+            s = np.asarray(1j * omega, dtype=np.complex128)
+            P_Y, P_F, *_ = held_transfers(data, s, C)
+            return P_Y, s * P_F, np.array([np.ones_like(omega), omega**2]) * hook.density(omega)
+
+        def spectra(omega: FloatArray) -> FloatArray:
+            P_Y, _, shaken = responses(omega)
+            return np.asarray(np.abs(P_Y) ** 2 * shaken)
+
         nodes = adaptive_nodes(
-            lambda omega: moved(C, omega) * hook.density(omega) * omega**power,
+            spectra,
             *hook.band,
             splits=hook.splits,
             poles=[complex(pole) for pole in poles if pole.real < 0.0],
             rtol=1e-9,
         )
-        weights = nodes.weights * hook.density(nodes.omega) * nodes.omega**power
-        return lambda C: math.sqrt(moved(C, nodes.omega) @ weights)
+        moved, slowed, shaken = responses(nodes.omega)
+        weights = shaken * nodes.weights
+
+        def rms(other: float) -> tuple[float, float]:
+            # More drag is a force on the payload that its velocity makes.
+            variances = weights @ np.abs(moved / (1.0 + (other - C) * slowed)) ** 2
+            motion, velocity = np.sqrt(variances).tolist()
+            return motion, velocity
+
+        return rms
 
     fixed = case.payload.fixed_drag
-    if fixed is None:
-        fixed = settled_drag(data.quadratic_drag, lambda C: about(C, 2), 0.0)
-    return fixed, about(fixed, 0)(fixed)
+    if fixed is None and data.quadratic_drag > 0.0:
+        tried: list[Callable[[float], tuple[float, float]]] = []
+
+        def velocity(C: float) -> Callable[[float], float]:
+            tried.append(rms := about(C))
+            return lambda other: rms(other)[1]
+
+        fixed = settled_drag(data.quadratic_drag, velocity, near)
+        return fixed, tried[-1](fixed)[0]
+    fixed = fixed or 0.0
+    return fixed, about(fixed)(fixed)[0]
 
 
 def held_poles(data: PlantData, drag: float, highest: float) -> ComplexArray:
@@ -451,13 +482,22 @@ def locked_response(case: Case, omega: FloatArray, drag: float) -> ComplexArray:
 
 
 @lru_cache(maxsize=16)
-def with_masses(question: DesignQuestion, masses: int) -> DesignQuestion:
-    """Return the question on another number of rope masses, the same one if asked again."""
-    model, heard = build_plant(question.data, masses), question.structure.measurements
+def with_masses(
+    question: DesignQuestion, masses: int, like: DesignQuestion | None = None
+) -> DesignQuestion:
+    """Return the question on another number of rope masses, the same one if asked again.
+
+    One on as many masses may be known that has the same plant.
+    """
+    if like is None:
+        model, heard = build_plant(question.data, masses), question.structure.measurements
+        plant = loaded_plant(question.case, question.data, model, question.drag_before, heard)
+    else:
+        model, plant = like.model, like.plant
     return replace(
         question,
         model=model,
-        plant=loaded_plant(question.case, question.data, model, question.drag_before, heard),
+        plant=plant,
         loop=tuple(_rescaled(lim, question.data, model.masses) for lim in question.loop),
     )
 
