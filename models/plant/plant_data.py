@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..basics import ComplexArray, FloatArray, InputError, check_range
+from ..basics import ComplexArray, FloatArray, InputError, check_range, read_only
 from .rope import (
     MAX_MASSES,
     fixed_top_modes,
@@ -193,7 +193,7 @@ class PlantData:
     def lumped_axial_modes(self, masses: int, lumping: str = "distributed") -> FloatArray:
         """Return the axial modes of the chain with so many rope masses [rad/s]."""
         rope = (self.axial_stiffness, self.rope_length, self.mass_per_length)
-        return lumped_modes(lump_rope(masses, lumping), *rope, self.payload_mass, **self._rig)
+        return _lumped_modes(masses, lumping, *rope, self.payload_mass, **self._rig)
 
     @property
     def _rig(self) -> dict[str, float]:
@@ -381,6 +381,12 @@ class PlantData:
         if not np.any(found.skin_drag):
             return found
         return replace(found, quadratic_drag=found.quadratic_drag + found.lumped_skin_drag)
+
+
+@lru_cache(maxsize=256)
+def _lumped_modes(masses: int, lumping: str, *rope: float, **rig: float) -> FloatArray:
+    """Return `lumped_modes`, the same array if asked again: few masses are tried at every look."""
+    return read_only(lumped_modes(lump_rope(masses, lumping), *rope, **rig))
 
 
 def _mean_of_ways(efficiency: float) -> float:

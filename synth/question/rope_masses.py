@@ -43,7 +43,7 @@ _NEARER = 0.8  # share of the step before, of a long one that is worth another
 _STEPS = 8  # of Newton's method towards a pole
 _FINE = 1e-7  # relative difference for a slope
 _SAME = 1e-6  # relative distance of poles that are one
-_PLACED = 0.05  # of its width, by which a pole may be off
+_PLACED = 0.3  # of a pole's width, after a step of which it has its place
 _UNFELT = 0.05  # peak of the loop gain below which a pole is not looked for
 _LIGHT = 0.3  # damping ratio above which a pole is no resonance
 
@@ -210,21 +210,22 @@ class _OnTheRope:
         Where they are looked for from is among them.
         """
         # Not at a pole that the controller has for itself, where its response has no value.
-        begins = self.begins * (1.0 + _SAME)
+        s = self.begins * (1.0 + _SAME)
+        # With each friction the open loop, and the closed one.
+        frictions = np.repeat(self.frictions, 2)[:, None]
+        closed = np.tile([0.0, 1.0], len(self.frictions))[:, None]
         with np.errstate(all="ignore"):
-            move, slope = self._towards(begins, np.array(self.frictions)[:, None], 0.0)
+            move, slope = self._towards(s, frictions, closed)
             # L has 1/slope for a residue there, and so much of a peak on the axis.
-            width = np.abs((begins - move).real)
-            felt = (np.abs(slope) * width < 1.0 / _UNFELT) | (np.abs(move) > _FAR * np.abs(begins))
-        begins = begins[felt.any(axis=0)]
-        # Of each friction the open loop's, then the closed one's.
-        closed = np.repeat(np.tile([0.0, 1.0], len(self.frictions)), begins.size)
-        friction = np.repeat(self.frictions, 2 * begins.size)
-        s = np.tile(begins, 2 * len(self.frictions))
-        before, arrived = np.full(s.size, np.inf), [begins]
-        with np.errstate(all="ignore"):
+            apart, width = move[::2], np.abs((s - move[::2]).real)
+            felt = (np.abs(slope[::2]) * width < 1.0 / _UNFELT) | (np.abs(apart) > _FAR * np.abs(s))
+            some = felt.any(axis=0)
+            arrived, move = [s[some]], move[:, some].ravel()
+            s, friction, closed = (
+                part.ravel() for part in np.broadcast_arrays(s[some], frictions, closed)
+            )
+            before = np.full(s.size, np.inf)
             for _ in range(_STEPS):
-                move, _ = self._towards(s, friction, closed)
                 size, whole = np.abs(move), np.abs(s)
                 s = s - move * np.minimum(1.0, _FAR * whole / size)
                 light = np.isfinite(s) & (s.imag > 0.0) & (np.abs(s.real) < _LIGHT * np.abs(s))
@@ -232,17 +233,18 @@ class _OnTheRope:
                 arrived.append(s[light & done])
                 # What is far and comes no nearer leads to a pole elsewhere, or to none.
                 left = light & ~done & ((size <= _FAR * whole) | (size < _NEARER * before))
+                if not left.any():
+                    break
                 before = size[left]
                 s, friction, closed = s[left], friction[left], closed[left]
-                if not s.size:
-                    break
+                move, _ = self._towards(s, friction, closed)
         found = np.concatenate(arrived)
         # Points about a pole that is there twice would lie apart by rounding only.
         same = np.abs(found[:, None] - found) < _SAME * np.abs(found)
         return np.asarray(found[~np.tril(same, -1).any(axis=1)])
 
     def _towards(
-        self, s: ComplexArray, friction: FloatArray, closed: FloatArray | float
+        self, s: ComplexArray, friction: FloatArray, closed: FloatArray
     ) -> tuple[ComplexArray, ComplexArray]:
         """Return Newton's step back to where 1/L, plus 1 where closed, vanishes, and its slope.
 
