@@ -193,7 +193,8 @@ class LinearPlant(ReadOnlyArrays):
                 f"{_OWNER}: the response is asked for at a pole of the plant, s = "
                 f"{_nearest(self.poles(), points):.6g} 1/s"
             )
-        rows += direct
+        at, of = np.nonzero(direct)
+        rows[:, at, of] += direct[at, of]
         nu, ny = len(self.inputs), len(self.measurements)
         width = nu + len(keep)
         for k, base in enumerate(self.rates.values()):  # the last columns are the ones times s
@@ -529,13 +530,16 @@ def late_and_held(s: ComplexArray, delays: Sequence[float], holds: Sequence[floa
 
     It is (k, ny); delays and holds are as of a `LinearPlant`, (ny,) [s].
     """
-    late, T = np.array(delays), np.array(holds)
+    # Signals of one sensor are alike.
+    each = [*zip(delays, holds, strict=True)]
+    alike = [*dict.fromkeys(each)]
+    late, T = np.array(alike).reshape(-1, 2).T
     factor = np.asarray(np.exp(-s * (late - 0.5 * T)), dtype=np.complex128)
     if np.any(T):
         x = s * T
         safe = np.where(x == 0.0, 1.0, x)
         factor = factor * np.where(x == 0.0, 1.0, -np.expm1(-safe) / safe)
-    return factor
+    return factor[:, [alike.index(own) for own in each]]
 
 
 def _matrix(name: str, value: npt.ArrayLike) -> FloatArray:
