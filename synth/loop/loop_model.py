@@ -87,10 +87,12 @@ class LoopModel:
             return self
         A1, A2 = T[:n, :n], T[n:, n:]
         B, C = Q.T @ (self.B / scale[:, None]), (self.C * scale) @ Q
-        beside, shrunk, fault = scipy.linalg.lapack.dtrsyl(A1, A2, -T[:n, n:], isgn=-1)
-        if fault:
-            return self
-        beside /= shrunk
+        beside = -T[:n, n:]
+        if n:
+            beside, shrunk, fault = scipy.linalg.lapack.dtrsyl(A1, A2, beside, isgn=-1)
+            if fault:
+                return self
+            beside /= shrunk
         B1, B2, C1, C2 = B[:n] - beside @ B[n:], B[n:], C[:, :n], C[:, n:] + C[:, :n] @ beside
         triangle, turn = scipy.linalg.rsf2csf(A2, np.eye(len(A2)))
         sizes = np.abs(triangle.diagonal())
