@@ -579,6 +579,11 @@ def consistent_coefficients(
 
     Raises SolverError if none agree: the loop is unstable with any drag.
     """
+    if nodes is None and start is None and all(d.band is not None for d in disturbances):
+        # Nodes that adapt are dear: the search on them begins where that on others ends.
+        end = plant, controller, disturbances, elements
+        with suppress(SolverError):
+            start = consistent_coefficients(*end, nodes=partial(_known_nodes, disturbances))
     drag = next((e for e in elements if isinstance(e, DragElement)), None)
     losses = [e for e in elements if e is not drag]
     first = [e.begin for e in elements] if start is None else list(start)
@@ -602,12 +607,12 @@ def consistent_coefficients(
     velocities, _ = _ends(elements)
     # On nodes that are made from poles alone the variances are taken, too.
     wanted = velocities if nodes is None else plant.outputs
-    end = plant, controller, tuple(elements), tuple(disturbances)
+    loop_on = plant, controller, tuple(elements), tuple(disturbances)
 
     def moved(known: Sequence[float]) -> Callable[[Sequence[float]], FloatArray]:
         """Return the variances of the velocities by coefficients, on nodes that suit some."""
         found = loop(*known).quadrature(velocities)
-        plain, densities = _plain_on(*end, wanted, found)
+        plain, densities = _plain_on(*loop_on, wanted, found)
         rows = [plain.outputs.index(e.velocity) for e in elements]
         forces = [plain.sources.index(e.force) for e in elements]
         shaken, felt = plain.zw[rows, : len(densities)], plain.zw[rows][:, forces]
