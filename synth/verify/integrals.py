@@ -107,11 +107,15 @@ def panels(
     edges = np.unique(edges[(edges >= low) & (edges <= high)])
     at, off = np.abs(marks.imag), np.maximum(np.abs(marks.real), 1e-9 * np.abs(marks))
     at, off = at[off > 0.0], off[off > 0.0]  # an integrator is no feature above zero
+    looked_at = np.column_stack([edges[:-1], edges[1:]])
     for _ in range(60):
-        a, b = edges[:-1, None], edges[1:, None]
+        a, b = looked_at[:, :1], looked_at[:, 1:]
         away = np.hypot(np.maximum(np.maximum(a - at, at - b), 0.0), off)
         long = 0.5 * (b - a)[:, 0] > away.min(axis=1, initial=0.5 * longest)
         if not long.any():
             break
-        edges = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])[long]]))
-    return edges
+        middle = looked_at[long].mean(axis=1)
+        edges = np.append(edges, middle)
+        low, high = looked_at[long].T
+        looked_at = np.concatenate([np.column_stack(p) for p in ((low, middle), (middle, high))])
+    return np.sort(edges)
