@@ -111,14 +111,17 @@ class Demand:
         self,
         loop: Loop,
         margins: CurveMargins,
-        region: tuple[ComplexArray, ComplexArray],
+        region: Callable[[], tuple[ComplexArray, ComplexArray]],
         moments: Moments,
     ) -> float:
-        """Return what a loop, its margins, its poles and its m0 (and m2) make of the limit."""
+        """Return what a loop, its margins, its poles and its m0 (and m2) make of the limit.
+
+        The poles are those of `CheckedLoop.region`, which few limits ask for.
+        """
         if self.kind in _MARGINS:
             return float(getattr(margins, self.kind))
         if self.kind in _POLES:
-            return _pole_figure(self.kind, *region)
+            return _pole_figure(self.kind, *region())
         if self.kind in ("low_frequency", "weighted"):
 
             def drift(omega: FloatArray) -> FloatArray:

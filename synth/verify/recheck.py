@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.basics import ComplexArray, SolverError, StillhookError
-from models.plant import LinearPlant, PlantResponse
+from models.plant import LinearPlant
 
 from .claims import ControllerMatrices, LoopClaims, SpectralSource
 from .demands import Demand
@@ -52,7 +52,7 @@ def winding_of_plant(plant: LinearPlant, law: LawMatrices, marks: npt.ArrayLike 
     The law is that of the controller around the plant, u = +C y.  `marks` are further points [1/s]
     near which the loop is lively, such as its closed-loop poles.
     """
-    poles = np.concatenate([open_loop_poles(plant.A), open_loop_poles(law.A)])
+    poles = _open_poles(plant, law)
     loop = Loop(plant=plant, law=law, marks=poles)
     # A direct path that is late turns for ever; one that is not ends at a number.
     through = np.eye(len(plant.inputs)) - law.D @ plant.D
@@ -86,10 +86,17 @@ def pade_order(plant: LinearPlant, usual: int = PADE) -> int:
     return _LATE_PADE if max(plant.delays, default=0.0) > _LATE else usual
 
 
-def pole_check(name: str, plant: LinearPlant, law: LawMatrices, on: str, slowest: float) -> Check:
-    """Return the check that all poles with Pade delays lie left of -slowest [1/s]."""
+def closed_poles(plant: LinearPlant, law: LawMatrices, usual: int = PADE) -> ComplexArray:
+    """Return the poles of a loop with Pade delays of `pade_order`, (n,) [1/s]."""
+    rational = plant.without_delays(pade_order(plant, usual))
+    return np.asarray(np.linalg.eigvals(closed_matrices(rational, law)[0]), dtype=np.complex128)
+
+
+def pole_check(
+    name: str, plant: LinearPlant, poles: ComplexArray, on: str, slowest: float
+) -> Check:
+    """Return the check that the `closed_poles` on a plant lie left of -slowest [1/s]."""
     order = pade_order(plant)
-    poles = np.linalg.eigvals(closed_matrices(plant.without_delays(order), law)[0])
     growth = float(poles.real.max(initial=-np.inf))
     return Check(
         name=name,
@@ -101,8 +108,14 @@ def pole_check(name: str, plant: LinearPlant, law: LawMatrices, on: str, slowest
 
 def closed_loop_marks(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
     """Return the poles [1/s] of open and closed loop, without integrators."""
-    closed = closed_matrices(plant.without_delays(pade_order(plant)), law)[0]
-    poles = [open_loop_poles(plant.A), open_loop_poles(law.A), np.linalg.eigvals(closed)]
+    return _marks(_open_poles(plant, law), closed_poles(plant, law))
+
+
+def _open_poles(plant: LinearPlant, law: LawMatrices) -> ComplexArray:
+    return np.concatenate([open_loop_poles(plant.A), open_loop_poles(law.A)])
+
+
+def _marks(*poles: ComplexArray) -> ComplexArray:
     found = np.concatenate(poles)
     return np.asarray(found[np.abs(found) > 0.0], dtype=np.complex128)
 
@@ -131,6 +144,8 @@ class CheckedLoop(Loop):
 
     sources: Sequence[SpectralSource]  #: What shakes it.
     demands: Mapping[str, Demand]  #: What is demanded of it, by name.
+    open_poles: ComplexArray  #: Poles [1/s] of plant and controller, integrators as exact zeros.
+    closed_poles: ComplexArray  #: `closed_poles` of the loop [1/s].
     own: Iterable[str]  #: Outputs whose variances are wanted besides.
     #: The loop without losses that switch, whose margins count too; None where it has none.
     still: CheckedLoop | None = None
@@ -146,16 +161,16 @@ class CheckedLoop(Loop):
         sources: Sequence[SpectralSource],
         demands: Mapping[str, Demand],
         own: Iterable[str],
-        exact: Callable[[ComplexArray, Sequence[str]], PlantResponse] | None = None,
     ) -> CheckedLoop:
         """Return the loop of a controller around a plant."""
         law = LawMatrices.of(controller, plant)
-        marks = closed_loop_marks(plant, law)
+        opened, closed = _open_poles(plant, law), closed_poles(plant, law)
         return cls(
             plant=plant,
             law=law,
-            marks=marks,
-            exact=exact,
+            marks=_marks(opened, closed),
+            open_poles=opened,
+            closed_poles=closed,
             sources=sources,
             demands=demands,
             own=own,
@@ -166,9 +181,8 @@ class CheckedLoop(Loop):
         """Poles [1/s] of the closed loop and of its delay models, where limits on them hold."""
         rational = self.plant.without_delays(pade_order(self.plant, _COUNTED_PADE))
         own = len(self.plant.states)
-        closed = closed_matrices(rational, self.law)[0], rational.A[own:, own:]
-        poles, models = (np.linalg.eigvals(A).astype(np.complex128) for A in closed)
-        return poles, models
+        models = np.linalg.eigvals(rational.A[own:, own:]).astype(np.complex128)
+        return closed_poles(self.plant, self.law, _COUNTED_PADE), models
 
     @cached_property
     def margins(self) -> CurveMargins:
@@ -228,10 +242,10 @@ class CheckedLoop(Loop):
     def measured(self, demand: Demand) -> float:
         """Return what the loop makes of a demand, with the worst signs of the unit's errors."""
         each = self.signed if demand.orders and self.signs else [self.moments]
-        found = [demand.measured(self, self.margins, self.region, one) for one in each]
+        found = [demand.measured(self, self.margins, lambda: self.region, one) for one in each]
         if self.still is not None and not demand.orders:
             still = self.still
-            found.append(demand.measured(still, self.margins, still.region, self.moments))
+            found.append(demand.measured(still, self.margins, lambda: still.region, self.moments))
         return min(found) if demand.at_least else max(found)
 
     def margin_checks(self, claimed: object | None) -> list[Check]:

@@ -111,11 +111,11 @@ class _TunedLoop:
         return found
 
     def stability(self) -> list[Check]:
-        plant, law, marks = self.plant, self.checked.law, self.checked.marks
-        fastest = float(np.abs(marks).max(initial=1.0))
+        loop, plant = self.checked, self.plant
+        fastest = float(np.abs(loop.marks).max(initial=1.0))
         return [
-            winding_check(winding_of_plant(plant, law, marks), "the plant"),
-            pole_check("poles", plant, law, "the plant", _DECAY * fastest),
+            winding_check(winding_of_plant(plant, loop.law, loop.marks), "the plant"),
+            pole_check("poles", plant, loop.closed_poles, "the plant", _DECAY * fastest),
         ]
 
     def parameters(self) -> list[Check]:

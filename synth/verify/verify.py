@@ -42,6 +42,7 @@ from .integrals import integrate, panels
 from .recheck import (
     TIGHT,
     CheckedLoop,
+    closed_poles,
     looked_at,
     pade_order,
     pole_check,
@@ -51,10 +52,10 @@ from .recheck import (
 )
 from .recompute import HOOK, LawMatrices, Source, imaginary, lyapunov_variances, moments
 from .verification import Check, Verification, agreement, bounded
-from .winding import count_unstable, open_loop_poles
+from .winding import count_unstable
 
 _GAINS = ("a", "a1", "a2")
-_TORQUE, _SPEED = "motor.torque", "motor.speed"
+_TORQUE, _SPEED, _DRAG = "motor.torque", "motor.speed", "payload.force"
 _UNDAMPED = 1e-5  # a rope damped less than this has modes without end on the axis
 _MARGINAL = 1e-9  # growth over the size of the fastest pole that is none
 _DECAY = 1e-7  # slowest decay that counts as stable [1/s]: a time constant of four months
@@ -98,6 +99,7 @@ class _Winch:
 
     design: DesignClaims
     _plants: dict[int, LinearPlant] = field(default_factory=dict)
+    _loops: dict[tuple[int, bool], CheckedLoop] = field(default_factory=dict)
 
     @cached_property
     def data(self) -> PlantData:
@@ -172,12 +174,25 @@ class _Winch:
     def _plant(self, masses: int) -> LinearPlant:
         """Return the plant that moves, on some rope masses."""
         if masses not in self._plants:
-            self._plants[masses] = self._plant_with(masses, self.design.friction, self.design.drag)
+            case, drag, friction = self.design.case, self.design.drag, self.design.friction
+            plant = sensed_plant(case, masses=masses, drag=drag, friction=friction)
+            heard = self.design.controller.measurements
+            self._plants[masses] = plant.select(measurements=heard)
         return self._plants[masses]
 
-    def _plant_with(self, masses: int, friction: float, drag: float) -> LinearPlant:
-        plant = sensed_plant(self.design.case, masses=masses, drag=drag, friction=friction)
-        return plant.select(measurements=self.design.controller.measurements)
+    def _without_losses(self, masses: int) -> LinearPlant:
+        """Return that plant without the friction of losses that switch."""
+        plant, friction = self._plant(masses), self.design.friction
+        return plant.with_element(_SPEED, LOAD, friction) if friction else plant
+
+    def _lumped(self, masses: int, *, friction: bool) -> CheckedLoop:
+        """Return the loop on some rope masses, with or without that friction."""
+        key = masses, friction
+        if key not in self._loops:
+            plant = self._plant(masses) if friction else self._without_losses(masses)
+            controller = self.design.controller
+            self._loops[key] = CheckedLoop.of(plant, controller, self.sources, self.demands, ())
+        return self._loops[key]
 
     def _line(self, friction: float, s: ComplexArray, disturbances: Sequence[str]) -> PlantResponse:
         return sensed_line_at(
@@ -199,14 +214,10 @@ class _Winch:
         """Return the loop on some rope masses, or on the rope itself, without losses beside it."""
         found: CheckedLoop | None = None
         for friction in (0.0, self.design.friction) if self.design.friction else (0.0,):
-            plant = self._plant(masses)
-            if friction != self.design.friction:
-                plant = plant.with_element(_SPEED, LOAD, self.design.friction - friction)
-            exact = partial(self._line, friction) if rope else None
-            controller, still = self.design.controller, found
-            found = CheckedLoop.of(plant, controller, self.sources, self.demands, own, exact)
-            found = replace(found, still=still)
-            if exact is not None:
+            lumped = self._lumped(masses, friction=bool(friction))
+            found = replace(lumped, own=own, still=found)
+            if rope:
+                found = replace(found, exact=partial(self._line, friction))
                 # A mode with hardly any damping is narrower than its place on masses is off by.
                 begins = np.concatenate([found.marks, self.data.damped_modes(_HELD_MODES)])
                 near = roots_near(partial(_near_pole, found), begins[begins.imag > 0.0])
@@ -246,11 +257,11 @@ class _Winch:
         return found
 
     def _stability(self, on_rope: CheckedLoop, own: CheckedLoop) -> list[Check]:
-        plant, law = on_rope.plant, on_rope.law
+        plant = on_rope.plant
         if self.distributed:
             # The rope is damped, so its open loop has no pole right of the axis; the lumped
             # one has the same integrators, and would show an unstable drive.
-            poles = np.concatenate([open_loop_poles(plant.A), open_loop_poles(law.A)])
+            poles = on_rope.open_poles
             winding = count_unstable(
                 on_rope.difference,
                 poles=poles[(np.abs(poles) == 0.0) | (poles.real > 0.0)],
@@ -258,7 +269,7 @@ class _Winch:
                 per_decade=_ROPE_PER_DECADE,
             )
         else:
-            winding = winding_of_plant(plant, law, on_rope.marks)
+            winding = winding_of_plant(plant, on_rope.law, on_rope.marks)
         spring = self.data.lumping == "thesis"
         coarse, fine = (
             "the one spring" if spring else f"a rope of {masses} masses"
@@ -266,18 +277,21 @@ class _Winch:
         )
         return [
             winding_check(winding, self.yardstick_name),
-            pole_check("poles", plant, law, fine, _DECAY),
-            pole_check("poles.design", own.plant, own.law, coarse, _DECAY),
+            pole_check("poles", plant, on_rope.closed_poles, fine, _DECAY),
+            pole_check("poles.design", own.plant, own.closed_poles, coarse, _DECAY),
         ]
 
     def in_a_calm(self) -> list[Check]:
         """Return the check of the poles without drag, which in small motion there is none of."""
         if self.design.case.payload.fixed_drag is not None or self.data.quadratic_drag == 0.0:
             return []
-        plant = self._plant_with(self.more_masses, 0.0, 0.0)
+        plant = self._without_losses(self.more_masses)
+        plant = plant.with_element(VELOCITY, _DRAG, self.design.drag)
         fastest = float(np.abs(self.fine.marks).max())
         on = f"a rope of {self.more_masses} masses, without drag"
-        check = pole_check("poles.calm", plant, self.fine.law, on, -_MARGINAL * fastest)
+        check = pole_check(
+            "poles.calm", plant, closed_poles(plant, self.fine.law), on, -_MARGINAL * fastest
+        )
         # What is told to swing may do so.
         return [replace(check, counts=self.design.ok)]
 
@@ -391,7 +405,9 @@ class _Winch:
         )
         plant = plant.select(measurements=self.design.controller.measurements)
         law = LawMatrices.of(self.design.controller, plant)
-        check = pole_check("rope modes", plant, law, f"a rope of {_MODAL_MASSES} masses", 0.0)
+        check = pole_check(
+            "rope modes", plant, closed_poles(plant, law), f"a rope of {_MODAL_MASSES} masses", 0.0
+        )
         note = check.note
         if not check.ok:
             note = (

@@ -220,12 +220,13 @@ def open_loop_poles(A: npt.ArrayLike) -> ComplexArray:
     rest: FloatArray = scipy.linalg.matrix_balance(np.array(A, dtype=float), permute=False)[0]
     order = len(rest)
     while len(rest):
-        _, sizes, rows = np.linalg.svd(rest)
+        basis, triangle, _ = scipy.linalg.qr(rest.T, pivoting=True)
+        sizes = np.abs(np.diag(triangle))
         rank = int(np.sum(sizes > 1e-13 * sizes[0]))
         if rank == len(rest):
             break
-        kept = rows[:rank]
-        rest = kept @ rest @ kept.T
+        kept = basis[:, :rank]
+        rest = kept.T @ rest @ kept
     poles = np.zeros(order, dtype=np.complex128)
     poles[: len(rest)] = np.linalg.eigvals(rest)
     return poles
