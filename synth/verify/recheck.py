@@ -16,7 +16,7 @@ from models.plant import LinearPlant
 from .claims import ControllerMatrices, LoopClaims, SpectralSource
 from .demands import Demand
 from .nyquist import CurveMargins, curve_margins
-from .recompute import LawMatrices, Loop, closed_matrices, moments, signed_moments
+from .recompute import LawMatrices, Loop, closed_matrices, moments, moments_of_views
 from .verification import Check, Verification, agreement, failure
 from .winding import Winding, count_unstable, open_loop_poles
 
@@ -199,34 +199,26 @@ class CheckedLoop(Loop):
 
         Integrals to infinity may be infinite, each on its own.
         """
+        return self._views[0]
+
+    @cached_property
+    def _views(self) -> list[dict[str, tuple[float, ...]]]:
+        """`moments`, and those with each combination of signs of the unit's errors."""
+        demands = [*self.demands.values()]
         orders: dict[str, tuple[int, ...]] = dict.fromkeys(self.own, (0,))
-        # With signs of errors the demands are about `signed`.
-        demands = [] if self.signs else [*self.demands.values()]
         for demand in demands:
             for name, own in demand.orders.items():
                 orders[name] = max(orders.get(name, ()), own, key=len)
-        found: dict[str, tuple[float, ...]] = {}
         if any(source.band is None for source in self.sources):
             found = {
                 n: tuple(self._endless(n, order) for order in own) for n, own in orders.items()
             }
             # Where it cannot be told they are taken as going together, the worst they can do.
-            return found | {d.together: (1.0,) for d in demands if d.together}
-        pairs = _pairs(demands)
-        for wanted in sorted(set(orders.values())):
-            names = sorted(name for name, own in orders.items() if own == wanted)
-            mixed = {key: pair for key, pair in pairs.items() if {*pair} <= {*names}}
-            found |= moments(self, names, self.sources, orders=wanted, pairs=mixed)
-        for key in pairs.keys() - found.keys():
-            found |= moments(self, pairs[key], self.sources, orders=(0,), pairs={key: pairs[key]})
-        return found
-
-    @cached_property
-    def signed(self) -> list[dict[str, tuple[float, ...]]]:
-        """Moments of what is demanded with each combination of signs of the unit's errors."""
-        asked = [demand for demand in self.demands.values() if demand.orders]
-        names = sorted({name for demand in asked for name in demand.outputs})
-        return signed_moments(self, names, self.rest, self.signs, pairs=_pairs(asked))
+            return [found | {d.together: (1.0,) for d in demands if d.together}]
+        pairs = {demand.together: demand.outputs for demand in demands if demand.together}
+        views = [(1.0 + 0.0j, self.sources), *((sign, self.rest) for sign in self.signs)]
+        most = max(orders.values(), key=len, default=(0,))
+        return moments_of_views(self, sorted(orders), views, orders=most, pairs=pairs)
 
     def _endless(self, output: str, order: int) -> float:
         delay = max(self.plant.delays, default=0.0)
@@ -241,7 +233,7 @@ class CheckedLoop(Loop):
 
     def measured(self, demand: Demand) -> float:
         """Return what the loop makes of a demand, with the worst signs of the unit's errors."""
-        each = self.signed if demand.orders and self.signs else [self.moments]
+        each = self._views[1:] if demand.orders and self.signs else [self.moments]
         found = [demand.measured(self, self.margins, lambda: self.region, one) for one in each]
         if self.still is not None and not demand.orders:
             still = self.still
@@ -293,11 +285,6 @@ class CheckedLoop(Loop):
         for name in sorted(set(claims) - set(self.demands)):
             checks.append(failure(f"limits.{name}", f"the {by} has no such limit"))
         return checks
-
-
-def _pairs(demands: Sequence[Demand]) -> dict[str, Sequence[str]]:
-    """Return the outputs whose correlation demands ask for, by its name."""
-    return {demand.together: demand.outputs for demand in demands if demand.together}
 
 
 def inverse_agreement(name: str, claimed: float, found: float) -> Check:

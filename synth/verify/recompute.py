@@ -11,7 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,6 @@ from .integrals import integrate, panels
 from .winding import Function
 
 HOOK = "hook.heave"
-_KEPT = 8  # sets of points whose responses are kept
 _SMOOTH_TAIL, _RINGING_TAIL = 20, 1000  # panels of 1/omega above all poles
 _RUNG_OUT = 3000.0  # omega times delay where the ringing is too small to matter
 
@@ -58,9 +57,24 @@ class LawMatrices:
         return cls(A=np.array(controller.A), B=B, C=C, D=D)
 
     def __call__(self, s: ComplexArray) -> ComplexArray:
-        """Return C(s) at points s [1/s], (k, nu, ny)."""
-        inverse = np.linalg.inv(s[:, None, None] * np.eye(len(self.A)) - self.A)
-        return np.asarray(self.D + self.C @ inverse @ self.B, dtype=np.complex128)
+        """Return C(s) at points s [1/s], (k, nu, ny), not finite at a pole."""
+        T, into, out_of = self._triangular
+        rows = np.empty((len(T), len(self.C), s.size), dtype=np.complex128)  # of C (s I - A)^-1
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for j, column in enumerate(T.T):
+                known = np.tensordot(column[:j], rows[:j], axes=1)
+                rows[j] = (out_of[:, j, None] + known) / (s - T[j, j])
+            return np.asarray(self.D + np.tensordot(rows, into, axes=(0, 0)).transpose(1, 0, 2))
+
+    @cached_property
+    def _triangular(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """T, upper triangular, and B and C in its coordinates."""
+        if not len(self.A):
+            none, B, C = (np.asarray(m, dtype=np.complex128) for m in (self.A, self.B, self.C))
+            return none, B, C
+        balanced, (scale, _) = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
+        T, turned = scipy.linalg.schur(balanced, output="complex")
+        return T, turned.conj().T @ (self.B / scale[:, None]), (self.C * scale) @ turned
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,7 +88,6 @@ class Loop:
     #: Points s and names of disturbances -> the plant's blocks, where they are not those of `plant`
     #: (a distributed rope).
     exact: Callable[[ComplexArray, Sequence[str]], PlantResponse] | None = None
-    _known: dict[Any, tuple[PlantResponse, ComplexArray]] = field(default_factory=dict)
     _parts: dict[Any, LinearPlant] = field(default_factory=dict)
 
     def blocks(
@@ -91,15 +104,17 @@ class Loop:
     def difference(self, s: ComplexArray) -> ComplexArray:
         """Return det(I - C P_yu), (k,)."""
         matrix = self._matrix(self.law(s), self.blocks(s))
+        if matrix.shape[1] == 1:
+            return matrix[:, 0, 0]
         return np.asarray(np.linalg.det(matrix), dtype=np.complex128)
 
     def broken(self, index: int) -> Function:
         """Return 1 + L of loop `index`, all others closed, as a function of s."""
+        if len(self.plant.inputs) == 1:
+            return self.difference
 
         def difference(s: ComplexArray) -> ComplexArray:
             matrix = self._matrix(self.law(s), self.blocks(s))
-            if matrix.shape[1] == 1:
-                return matrix[:, 0, 0]
             return np.asarray(1.0 / np.linalg.inv(matrix)[:, index, index])
 
         return difference
@@ -108,7 +123,7 @@ class Loop:
         self, s: ComplexArray, outputs: Sequence[str], disturbances: Sequence[str]
     ) -> ComplexArray:
         """Return the closed-loop responses, (k, outputs, disturbances)."""
-        return self.transfers(s, outputs, disturbances, (1.0,))[0]
+        return self.transfers(s, outputs, disturbances, ())[0]
 
     def transfers(
         self,
@@ -116,33 +131,34 @@ class Loop:
         outputs: Sequence[str],
         disturbances: Sequence[str],
         shown: Sequence[complex],
-    ) -> list[ComplexArray]:
-        """Return `transfer` by what the reference unit shows of the hook's motion.
+    ) -> tuple[ComplexArray, list[ComplexArray]]:
+        """Return `transfer`, and its column of the hook's heave by what the unit shows of that.
 
-        That is over what it should show, with its gain and phase error [-].
+        The reference unit shows it over what it should show, with its gain and phase error [-].
+        The columns are (k, outputs), none where the hook is no disturbance.
         """
-        key = s.tobytes(), tuple(outputs), tuple(disturbances)
-        if key not in self._known:
-            blocks, law = self.blocks(s, outputs, disturbances), self.law(s)
-            if len(self._known) >= _KEPT:
-                self._known.clear()
-            inner = np.linalg.solve(self._matrix(law, blocks), law)
-            self._known[key] = blocks, np.asarray(blocks.zu @ inner, dtype=np.complex128)
-        blocks, through = self._known[key]
+        blocks, law = self.blocks(s, outputs, disturbances), self.law(s)
+        matrix = self._matrix(law, blocks)
+        alone = matrix.shape[1] == 1
+        inner = np.asarray(law / matrix if alone else np.linalg.solve(matrix, law))
+        found = np.asarray(blocks.zw + _product(blocks.zu, _product(inner, blocks.yw)))
+        if HOOK not in disturbances:
+            return found, []
+        hook = list(disturbances).index(HOOK)
         unit = [k for k, y in enumerate(blocks.measurements) if y.startswith("mru.")]
-        found = []
-        for one in shown:
-            seen = blocks.yw
-            if one != 1.0 and HOOK in disturbances:
-                seen = np.array(seen)
-                seen[:, unit, list(disturbances).index(HOOK)] *= one
-            found.append(np.asarray(blocks.zw + through @ seen, dtype=np.complex128))
-        return found
+        moved = _product(inner[:, :, unit], blocks.yw[:, unit, hook, None])
+        by_unit = _product(blocks.zu, moved)[:, :, 0]
+        return found, [found[:, :, hook] + (one - 1.0) * by_unit for one in shown]
 
     @staticmethod
     def _matrix(law: ComplexArray, blocks: PlantResponse) -> ComplexArray:
-        through = law @ blocks.yu
+        through = _product(law, blocks.yu)
         return np.asarray(np.eye(through.shape[1]) - through, dtype=np.complex128)
+
+
+def _product(left: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Return products of small matrices, (k, n, m) and (k, m, l): LAPACK is slow with many."""
+    return np.asarray(np.einsum("knm,kml->knl", left, right), dtype=np.complex128)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -192,57 +208,76 @@ def moments(
     SolverError
         If it does not converge: the integral does not exist, or a spectrum is wild.
     """
-    how = partial(signed_moments, orders=orders, rtol=rtol, delay=delay)
-    return how(loop, outputs, sources, (1.0,), pairs=pairs or {})[0]
+    views = [(1.0 + 0.0j, sources)]
+    how = partial(moments_of_views, orders=orders, rtol=rtol, delay=delay)
+    return how(loop, outputs, views, pairs=pairs or {})[0]
 
 
-def signed_moments(
+def moments_of_views(
     loop: Loop,
     outputs: Sequence[str],
-    sources: Sequence[SpectralSource],
-    shown: Sequence[complex],
+    views: Sequence[tuple[complex, Sequence[SpectralSource]]],
     *,
     pairs: Mapping[str, Sequence[str]],
     orders: Sequence[int] = (0, 2),
     rtol: float = 1e-8,
     delay: float = 0.0,
 ) -> list[dict[str, tuple[float, ...]]]:
-    """Return `moments` by what the reference unit shows, see `Loop.transfers`."""
-    names = [source.name for source in sources]
+    """Return `moments` for each of several views of what shakes a loop, all in one go.
+
+    A view is what the reference unit shows, see `Loop.transfers`, and the sources; these have the
+    same names in all views.
+    """
+    every = {id(source): source for _, sources in views for source in sources}
+    names = [source.name for source in views[0][1]]
     powers = np.asarray(orders, dtype=np.float64)[:, None]
-    low, high, splits, half_line = _band(sources, loop.marks)
+    low, high, splits, half_line = _band([*every.values()], loop.marks)
     longest, tail = np.inf, _SMOOTH_TAIL
     if half_line and delay > 0.0:
         longest, tail = 4.0 * np.pi / delay, _RINGING_TAIL
         high = max(high, _RUNG_OUT / delay)
     edges = panels(low, high, splits, loop.marks, longest)
     couples = [[outputs.index(name) for name in pair] for pair in pairs.values()]
-    mixed = np.eye(len(outputs))
+    mixed = np.zeros((len(couples), len(outputs)))
+
+    def squared(transfer: ComplexArray) -> FloatArray:
+        """Return the squared sizes of responses and of sums of them, (k, sums, ...)."""
+        if len(mixed):
+            sums = np.einsum("cz,kz...->kc...", mixed, transfer)
+            transfer = np.concatenate([transfer, sums], axis=1)
+        return np.asarray(transfer.real**2 + transfer.imag**2)
 
     def density(omega: FloatArray) -> FloatArray:
-        """Return omega^n S of every sum of outputs, (shown * sums * orders, k)."""
-        shaken = np.stack([source.density(omega) for source in sources])
-        each = loop.transfers(imaginary(omega), outputs, names, shown)
-        spectra = [np.einsum("kzw,wk->zk", np.abs(mixed @ one) ** 2, shaken) for one in each]
+        """Return omega^n S of every sum of outputs, (views * sums * orders, k)."""
+        shaken = {key: source.density(omega) for key, source in every.items()}
+        shown = [one for one, _ in views]
+        found, columns = loop.transfers(imaginary(omega), outputs, names, shown)
+        sizes, spectra = squared(found), []
+        for k, (_, sources) in enumerate(views):
+            if columns:
+                sizes[:, :, names.index(HOOK)] = squared(columns[k])
+            own = np.stack([shaken[id(source)] for source in sources])
+            spectra.append(np.einsum("kzw,wk->zk", sizes, own))
         return np.asarray((np.stack(spectra)[:, :, None] * omega**powers).reshape(-1, omega.size))
 
     if couples:
         # Of outputs of about the same size, whatever their units.
-        rough = density(edges).reshape(len(shown), len(outputs), len(orders), -1)[0, :, 0]
-        size = np.sqrt(np.trapezoid(rough, edges))
+        rough = density(edges).reshape(len(views), -1, len(orders), edges.size)[0, :, 0]
+        size = np.sqrt(np.trapezoid(rough[: len(outputs)], edges))
         weights = np.array([[i in couple for i in range(len(outputs))] for couple in couples])
-        mixed = np.vstack([mixed, weights / np.where(size > 0.0, size, 1.0)])
+        mixed = weights / np.where(size > 0.0, size, 1.0)
     found = integrate(density, edges, rtol=rtol, tail_panels=tail if half_line else 0)
-    rows = found.reshape(len(shown), len(mixed), len(orders))
-    every = []
+    rows = found.reshape(len(views), -1, len(orders))
+    told = []
     for own in rows.tolist():
         one = {name: tuple(row) for name, row in zip(outputs, own, strict=False)}
-        for k, (name, couple) in enumerate(zip(pairs, couples, strict=True), len(outputs)):
+        for k, (name, couple) in enumerate(zip(pairs, couples, strict=True)):
             parts = mixed[k, couple] * np.sqrt([own[i][0] for i in couple])
-            rho = (own[k][0] - parts @ parts) / (2.0 * parts.prod()) if parts.all() else 0.0
+            whole = own[len(outputs) + k][0]
+            rho = (whole - parts @ parts) / (2.0 * parts.prod()) if parts.all() else 0.0
             one[name] = (float(np.clip(rho, -1.0, 1.0)),)
-        every.append(one)
-    return every
+        told.append(one)
+    return told
 
 
 def closed_matrices(
