@@ -1,8 +1,8 @@
 """Integrals over frequency by other panels than the optimiser's, for the verification.
 
 The optimiser integrates with `models.basics.quadrature`, by longer and longer rules on each panel.
-Here the band is cut into panels of another kind, all of them are integrated at once by a pair of
-Gauss rules, and those are halved where the two differ.
+Here the band is cut into panels of another kind, all of them are integrated at once by Gauss's and
+Kronrod's rules, and those are halved where the two differ.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,14 +11,25 @@ import numpy as np
 
 from models.basics import BoolArray, ComplexArray, FloatArray, SolverError
 
-_PIECES = 40  # of each panel at most, on average, with 22 nodes each
+_PIECES = 40  # of each panel at most, on average, with 15 nodes each
 _HALVINGS = 40  # of any panel at most: what has no integral has none at its end either
 _PANELS_PER_DECADE = 4.0
 _RINGING = 1e-7  # accuracy of integrals to infinity
-_RULES = [np.polynomial.legendre.leggauss(count) for count in (15, 7)]
-_NODES = np.concatenate([nodes for nodes, _ in _RULES])
-_FINE = np.concatenate([_RULES[0][1], np.zeros(7)])
-_COARSE = np.concatenate([np.zeros(15), _RULES[1][1]])
+# QUADPACK's ``qk15``: Kronrod's rule on [-1, 1], every other node of which is one of Gauss's rule
+# of seven; node and both weights from the middle outwards.
+_RULE = np.array(
+    [
+        [0.0, 0.209482141084727828, 0.417959183673469388],
+        [0.207784955007898468, 0.204432940075298892, 0.0],
+        [0.405845151377397167, 0.190350578064785410, 0.381830050505118945],
+        [0.586087235467691130, 0.169004726639267903, 0.0],
+        [0.741531185599394440, 0.140653259715525919, 0.279705391489276668],
+        [0.864864423359769073, 0.104790010322250184, 0.0],
+        [0.949107912342758525, 0.063092092629978553, 0.129484966168869693],
+        [0.991455371120812639, 0.022935322010529225, 0.0],
+    ]
+)
+_NODES, _FINE, _COARSE = np.vstack([_RULE[:0:-1] * [-1.0, 1.0, 1.0], _RULE]).T.copy()
 
 
 def integrate(
