@@ -17,7 +17,7 @@ of the waves.  White noise has intensity one, a one-sided density of 1/pi.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +76,15 @@ def fit_shaping_filter(
 
     Raises InputError if the band holds no variance; SolverError if the fit does not converge.
     """
-    omega, width, target, variance = sampled_density("shaping filter", density, band, _NODES)
+    target = sampled_density("shaping filter", density, band, _NODES)[2]
+    return _fitted(target.tobytes(), band, order)
+
+
+@lru_cache(maxsize=8)
+def _fitted(samples: bytes, band: tuple[float, float], order: int) -> ShapingFilter:
+    """Return `fit_shaping_filter` of a density's samples: many designs are for one sea."""
+    known = np.frombuffer(samples)
+    omega, width, target, variance = sampled_density("", lambda _: known, band, _NODES)
     low, high = band
     cumulated = np.cumsum(target * width) / variance
     peak = float(omega[np.argmax(target)])

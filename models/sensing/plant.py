@@ -12,6 +12,7 @@ so what is designed here runs there.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -303,7 +304,7 @@ def sensed_line_at(
         noises = tuple(name for name in noises if name in disturbances)
         disturbances = [name for name in disturbances if name not in noises]
     if friction:
-        data = replace(data, viscous_friction=data.viscous_friction + friction)
+        data = _rubbing(data, friction)
     line, sensors = line_response(data, s, drag=drag, disturbances=disturbances), case.sensors
     points, names = line.s, (*line.disturbances, *noises)
     own, unit = 1 + len(line.disturbances), sensors.mru or PERFECT
@@ -354,6 +355,12 @@ def sensed_line_at(
         disturbances=names,
         measurements=heard,
     )
+
+
+@lru_cache(maxsize=4)
+def _rubbing(data: PlantData, friction: float) -> PlantData:
+    """Return a plant's data with more friction, kept for what they know of their rope."""
+    return replace(data, viscous_friction=data.viscous_friction + friction)
 
 
 def sensed_spectra(

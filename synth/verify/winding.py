@@ -251,8 +251,10 @@ def lively(
 
 def _smooth(values: ComplexArray) -> npt.NDArray[np.bool_]:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        step = np.log(values[1:] / values[:-1])
-    return np.asarray((np.abs(step.imag) <= _TURN) & (np.abs(step.real) <= _GROWTH))
+        step = values[1:] / values[:-1]
+        near = np.abs(step.imag) <= np.tan(_TURN) * step.real
+        size = step.real**2 + step.imag**2
+    return np.asarray(near & (size <= np.exp(2.0 * _GROWTH)) & (size >= np.exp(-2.0 * _GROWTH)))
 
 
 def axis_clusters(poles: ComplexArray) -> list[tuple[float, float, int]]:
