@@ -45,16 +45,18 @@ def line_response(
     *,
     drag: float,
     disturbances: Sequence[str] | None = None,
+    masses: int | None = None,
 ) -> PlantResponse:
     """Return the exact response of a case's plant at points s (k,) [1/s], such as i omega.
 
     Safe from overflow for any Re s >= 0: every hyperbolic function is carried as its product with
     exp(-gamma).  No point may be a pole (s = 0 is one).  The payload's equivalent linear drag is C
-    [N s/m]; of the disturbances some may be named, by default all are there.
+    [N s/m]; of the disturbances some may be named, by default all are there.  With `masses` it is
+    that of the rope in so many, see `rope_transfers`.
     """
     data = as_plant_data(source)
     s = np.array(s, dtype=np.complex128).reshape(-1)
-    P_Y, P_F, T_Y, T_F = rope_transfers(data, s, drag)
+    P_Y, P_F, T_Y, T_F = rope_transfers(data, s, drag, masses=masses)
 
     # Motor: torque = forward command - back s theta, both with the drive's dynamics in them.
     forward = data.torque_per_command(s)
@@ -113,7 +115,12 @@ def line_response(
 
 
 def rope_transfers(
-    data: PlantData, s: ComplexArray, drag: float, *, spring: bool = False
+    data: PlantData,
+    s: ComplexArray,
+    drag: float,
+    *,
+    spring: bool = False,
+    masses: int | None = None,
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
     """Return P/Y, P/F, T_top/Y and T_top/F of the rope with its payload, each (k,), at s [1/s].
 
@@ -121,6 +128,12 @@ def rope_transfers(
     payload, T_top the tension at the drum, as deviations from rest.  By reciprocity T_top/F =
     -P/Y.  Drag is C [N s/m]; Re s >= 0 is safe from overflow.  As in the thesis the rope may be one
     `spring`, with all of its mass below.
+
+    Or it is lumped in two `masses` or more as by `lump_rope`, which is a closed form too: between
+    masses m h with springs EA/h, h = L/(N - 1/2), a wave changes by exp(+-theta) from one to the
+    next, 2 sinh(theta/2) = g = gamma/(N - 1/2), and gamma above becomes (N - 1/2) theta where it is
+    an argument, with a factor cosh(theta/2) in the end springs' halves.  A tip is then in series
+    with the whole rope, as in a plant of a hysteretic one.
     """
     stiffness = data.rope_modulus(s)
     D, slings = data.payload_mass * s**2 + drag * s, 1.0 / data.sling_stiffness
@@ -129,7 +142,7 @@ def rope_transfers(
     if spring:
         P_Y, P_F, T_Y = _spring_transfers(data, s, stiffness, hung)
     else:
-        P_Y, P_F, T_Y = _line_transfers(data, s, stiffness, hung)
+        P_Y, P_F, T_Y = _line_transfers(data, s, stiffness, hung, masses)
     # From the rope's lower end to the payload, and from its upper end to the tip's foot.
     P_Y, P_F = P_Y * g, (P_F * g + slings) * g
     tip = 1.0 / data.tip_stiffness
@@ -148,20 +161,29 @@ def _spring_transfers(
 
 
 def _line_transfers(
-    data: PlantData, s: ComplexArray, stiffness: ComplexArray, hung: ComplexArray
+    data: PlantData,
+    s: ComplexArray,
+    stiffness: ComplexArray,
+    hung: ComplexArray,
+    masses: int | None,
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Return P/Y, P/F and T_top/Y of a rope with a load of dynamic stiffness `hung` below it."""
     compliance = data.rope_length / stiffness
     gamma = s * data.rope_length * np.sqrt(data.mass_per_length / stiffness)
     # All functions are even in gamma: take the root whose exponential does not grow.
     gamma = np.where(gamma.real < 0.0, -gamma, gamma)
-    decay = np.exp(-gamma)
-    cosh = 0.5 * (1.0 + decay**2)  # times exp(-gamma), as the next one
+    along, end = gamma, np.ones_like(gamma)
+    if masses is not None:
+        half = 0.5 * gamma / (masses - 0.5)  # sinh(theta/2)
+        along = np.asarray((2.0 * masses - 1.0) * np.arcsinh(half), dtype=np.complex128)
+        end = np.sqrt(1.0 + half**2)
+    decay = np.exp(-along)
+    cosh = 0.5 * (1.0 + decay**2)  # times exp(-along), as the next one
     safe = np.where(gamma == 0.0, 1.0, gamma)
-    sinh_over_gamma = np.where(gamma == 0.0, 1.0, -0.5 * np.expm1(-2.0 * safe) / safe)
+    sinh_over_gamma = np.where(gamma == 0.0, 1.0, -0.5 * np.expm1(-2.0 * along) / safe)
     # The wave equation's solution between Y above and the load's D P = F - tension below.
-    below = cosh + hung * compliance * sinh_over_gamma
+    below = end * cosh + hung * compliance * sinh_over_gamma
     P_Y = decay / below
     P_F = compliance * sinh_over_gamma / below
-    T_Y = (gamma**2 / compliance * sinh_over_gamma + hung * cosh) / below
+    T_Y = (gamma**2 / compliance * sinh_over_gamma + hung * cosh / end) / below
     return P_Y, P_F, T_Y

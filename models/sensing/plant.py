@@ -289,13 +289,14 @@ def sensed_line_at(
     data: PlantData | None = None,
     measurements: Sequence[str] | None = None,
     disturbances: Sequence[str] | None = None,
+    masses: int | None = None,
 ) -> PlantResponse:
     """Return the exact response of a case's rope, drive and sensors at points s (k,) [1/s].
 
     No point is a pole (s = 0 is one).  The payload's equivalent linear drag is in N s/m, the
     friction that of losses which switch, beside the motor's own [N m s/rad].  Names are those of
     `sensed_plant`, the rope `models.plant.line_response`.  Measurements and disturbances may be
-    named, by default all are there.
+    named, by default all are there.  With `masses`, two or more, the rope is lumped in them.
     """
     data = PlantData.from_case(case) if data is None else data
     heard = MEASURED if measurements is None else tuple(measurements)
@@ -305,7 +306,8 @@ def sensed_line_at(
         disturbances = [name for name in disturbances if name not in noises]
     if friction:
         data = _rubbing(data, friction)
-    line, sensors = line_response(data, s, drag=drag, disturbances=disturbances), case.sensors
+    line = line_response(data, s, drag=drag, disturbances=disturbances, masses=masses)
+    sensors = case.sensors
     points, names = line.s, (*line.disturbances, *noises)
     own, unit = 1 + len(line.disturbances), sensors.mru or PERFECT
     # By row, column (the command's, then the disturbances') and point.

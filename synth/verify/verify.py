@@ -5,7 +5,9 @@
 A design is made on a lumped rope with Pade models guarding its stability.  Here it has to stand
 on the exact delays and on more rope than it was designed on: the winding number on the
 distributed rope, eigenvalues on twice the masses, margins by root finding, variances by other
-quadrature, by a Lyapunov equation and on the distributed rope.  Nothing of the loop, the limits,
+quadrature, by a Lyapunov equation and on the distributed rope.  What its own rope masses do is
+a closed form here where there is one, without states or modes, but for poles and that equation,
+which take the plant's matrices.  Nothing of the loop, the limits,
 the question, the search or the design is used.  `verify_tuning` does the same for
 `synth.design.tune` on any linear plant.
 """
@@ -194,7 +196,9 @@ class _Winch:
             self._loops[key] = CheckedLoop.of(plant, controller, self.sources, self.demands, ())
         return self._loops[key]
 
-    def _line(self, friction: float, s: ComplexArray, disturbances: Sequence[str]) -> PlantResponse:
+    def _line(
+        self, friction: float, masses: int | None, s: ComplexArray, disturbances: Sequence[str]
+    ) -> PlantResponse:
         return sensed_line_at(
             self.design.case,
             s,
@@ -203,7 +207,14 @@ class _Winch:
             data=self.data,
             measurements=self.design.controller.measurements,
             disturbances=disturbances,
+            masses=masses,
         )
+
+    def _known_in_closed_form(self, masses: int) -> bool:
+        """Whether so many masses are: a tip is in series with a lumped rope of another law."""
+        data = self.data
+        uniform = math.isinf(data.tip_stiffness) or data.damping_law == "hysteretic"
+        return self.distributed and masses > 1 and uniform
 
     @cached_property
     def coarse_plant(self) -> LinearPlant:
@@ -216,8 +227,10 @@ class _Winch:
         for friction in (0.0, self.design.friction) if self.design.friction else (0.0,):
             lumped = self._lumped(masses, friction=bool(friction))
             found = replace(lumped, own=own, still=found)
+            if not rope and self._known_in_closed_form(masses):
+                found = replace(found, exact=partial(self._line, friction, masses))
             if rope:
-                found = replace(found, exact=partial(self._line, friction))
+                found = replace(found, exact=partial(self._line, friction, None))
                 # A mode with hardly any damping is narrower than its place on masses is off by.
                 begins = np.concatenate([found.marks, self.data.damped_modes(_HELD_MODES)])
                 near = roots_near(partial(_near_pole, found), begins[begins.imag > 0.0])

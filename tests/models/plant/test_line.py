@@ -82,6 +82,19 @@ def test_lumped_plant_converges_off_the_imaginary_axis(data: PlantData) -> None:
     assert max(distance(data, 40, s).values()) < 3e-3
 
 
+@pytest.mark.parametrize("masses", [2, 3, 12, 40])
+@every_variant
+def test_a_lumped_rope_is_a_closed_form_too(data: PlantData, masses: int) -> None:
+    s = np.concatenate([1j * np.geomspace(0.05, 60.0, 80), 0.3 + 1j * np.linspace(0.0, 20.0, 9)])
+    lumped = build_plant(data, masses=masses).linearise(drag=3e3).response_at(s)
+    found = line_response(data, s, drag=3e3, masses=masses)
+    for block in BLOCKS:
+        a, b = getattr(lumped, block), getattr(found, block)
+        assert np.abs(a - b).max() <= 1e-7 * np.abs(a).max(), block
+        off, size = (np.sqrt(np.mean(np.abs(x) ** 2, axis=0)) for x in (a - b, a))
+        assert np.all(off <= 1e-6 * size), block
+
+
 def test_a_rope_without_mass_is_one_spring() -> None:
     data = replace(ROPE, mass_per_length=1e-9, rope_weight=0.0)
     s = 1j * np.geomspace(0.01, 30.0, 80)
