@@ -45,7 +45,7 @@ def line_response(
     *,
     drag: float,
     disturbances: Sequence[str] | None = None,
-    masses: int | None = None,
+    masses: int = 0,
 ) -> PlantResponse:
     """Return the exact response of a case's plant at points s (k,) [1/s], such as i omega.
 
@@ -115,12 +115,7 @@ def line_response(
 
 
 def rope_transfers(
-    data: PlantData,
-    s: ComplexArray,
-    drag: float,
-    *,
-    spring: bool = False,
-    masses: int | None = None,
+    data: PlantData, s: ComplexArray, drag: float, *, spring: bool = False, masses: int = 0
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
     """Return P/Y, P/F, T_top/Y and T_top/F of the rope with its payload, each (k,), at s [1/s].
 
@@ -129,11 +124,10 @@ def rope_transfers(
     -P/Y.  Drag is C [N s/m]; Re s >= 0 is safe from overflow.  As in the thesis the rope may be one
     `spring`, with all of its mass below.
 
-    Or it is lumped in two `masses` or more as by `lump_rope`, which is a closed form too: between
-    masses m h with springs EA/h, h = L/(N - 1/2), a wave changes by exp(+-theta) from one to the
-    next, 2 sinh(theta/2) = g = gamma/(N - 1/2), and gamma above becomes (N - 1/2) theta where it is
-    an argument, with a factor cosh(theta/2) in the end springs' halves.  A tip is then in series
-    with the whole rope, as in a plant of a hysteretic one.
+    Or it is N >= 2 `masses` of `lump_rope`: a wave changes by exp(+-theta) from one to the next, 2
+    sinh(theta/2) = gamma/(N - 1/2), so that (N - 1/2) theta stands for gamma as an argument, and
+    the half pieces at the ends bring a factor cosh(theta/2).  A tip is in series with the whole
+    rope, as in a plant of a hysteretic one.
     """
     stiffness = data.rope_modulus(s)
     D, slings = data.payload_mass * s**2 + drag * s, 1.0 / data.sling_stiffness
@@ -161,11 +155,7 @@ def _spring_transfers(
 
 
 def _line_transfers(
-    data: PlantData,
-    s: ComplexArray,
-    stiffness: ComplexArray,
-    hung: ComplexArray,
-    masses: int | None,
+    data: PlantData, s: ComplexArray, stiffness: ComplexArray, hung: ComplexArray, masses: int
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Return P/Y, P/F and T_top/Y of a rope with a load of dynamic stiffness `hung` below it."""
     compliance = data.rope_length / stiffness
@@ -173,8 +163,8 @@ def _line_transfers(
     # All functions are even in gamma: take the root whose exponential does not grow.
     gamma = np.where(gamma.real < 0.0, -gamma, gamma)
     along, end = gamma, np.ones_like(gamma)
-    if masses is not None:
-        half = 0.5 * gamma / (masses - 0.5)  # sinh(theta/2)
+    if masses:
+        half = gamma / (2.0 * masses - 1.0)  # sinh(theta/2)
         along = np.asarray((2.0 * masses - 1.0) * np.arcsinh(half), dtype=np.complex128)
         end = np.sqrt(1.0 + half**2)
     decay = np.exp(-along)

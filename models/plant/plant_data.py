@@ -224,7 +224,8 @@ class PlantData:
         if self.damping_law != "hysteretic":
             return 1.0, np.zeros(0), np.zeros(0)
         first = self.first_mode
-        slow, gains, times = zener_branches(self.damping_ratio, first, self.highest_mode(first))
+        highest = float(self.highest_mode(first))
+        slow, gains, times = _kept_branches(self.damping_ratio, first, highest)
         there = gains[:, 0] > 0.0
         return float(slow[0]), gains[there, 0], times[there, 0]
 
@@ -429,3 +430,6 @@ def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
         f"on {data.rope_length:g} m of rope (about {count - 1}); a loop as fast as that cannot be "
         "designed on a lumped rope: lower its bandwidth or set rope.masses"
     )
+
+
+_kept_branches = lru_cache(maxsize=64)(zener_branches)  # of one rope, whatever else differs

@@ -12,7 +12,6 @@ so what is designed here runs there.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -289,7 +288,7 @@ def sensed_line_at(
     data: PlantData | None = None,
     measurements: Sequence[str] | None = None,
     disturbances: Sequence[str] | None = None,
-    masses: int | None = None,
+    masses: int = 0,
 ) -> PlantResponse:
     """Return the exact response of a case's rope, drive and sensors at points s (k,) [1/s].
 
@@ -305,7 +304,7 @@ def sensed_line_at(
         noises = tuple(name for name in noises if name in disturbances)
         disturbances = [name for name in disturbances if name not in noises]
     if friction:
-        data = _rubbing(data, friction)
+        data = replace(data, viscous_friction=data.viscous_friction + friction)
     line = line_response(data, s, drag=drag, disturbances=disturbances, masses=masses)
     sensors = case.sensors
     points, names = line.s, (*line.disturbances, *noises)
@@ -357,12 +356,6 @@ def sensed_line_at(
         disturbances=names,
         measurements=heard,
     )
-
-
-@lru_cache(maxsize=4)
-def _rubbing(data: PlantData, friction: float) -> PlantData:
-    """Return a plant's data with more friction, kept for what they know of their rope."""
-    return replace(data, viscous_friction=data.viscous_friction + friction)
 
 
 def sensed_spectra(

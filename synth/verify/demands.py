@@ -125,7 +125,7 @@ class Demand:
         if self.kind in ("low_frequency", "weighted"):
 
             def drift(omega: FloatArray) -> FloatArray:
-                found = loop.transfer(imaginary(omega), self.outputs, [self.disturbance])
+                found, _ = loop.transfers(imaginary(omega), self.outputs, [self.disturbance])
                 sizes = np.abs(found[:, 0, 0]) * self.weights(omega)
                 return np.asarray(sizes, dtype=np.float64)
 

@@ -15,21 +15,14 @@ _PIECES = 40  # of each panel at most, on average, with 15 nodes each
 _HALVINGS = 40  # of any panel at most: what has no integral has none at its end either
 _PANELS_PER_DECADE = 4.0
 _RINGING = 1e-7  # accuracy of integrals to infinity
-# QUADPACK's ``qk15``: Kronrod's rule on [-1, 1], every other node of which is one of Gauss's rule
-# of seven; node and both weights from the middle outwards.
-_RULE = np.array(
-    [
-        [0.0, 0.209482141084727828, 0.417959183673469388],
-        [0.207784955007898468, 0.204432940075298892, 0.0],
-        [0.405845151377397167, 0.190350578064785410, 0.381830050505118945],
-        [0.586087235467691130, 0.169004726639267903, 0.0],
-        [0.741531185599394440, 0.140653259715525919, 0.279705391489276668],
-        [0.864864423359769073, 0.104790010322250184, 0.0],
-        [0.949107912342758525, 0.063092092629978553, 0.129484966168869693],
-        [0.991455371120812639, 0.022935322010529225, 0.0],
-    ]
-)
-_NODES, _FINE, _COARSE = np.vstack([_RULE[:0:-1] * [-1.0, 1.0, 1.0], _RULE]).T.copy()
+# QUADPACK's ``qk15``, Kronrod's rule on [-1, 1]: weights from the middle outwards, at the nodes of
+# Gauss's rule of seven and between them, and the nodes between them.
+_WEIGHTS = [0.209482141084727828, 0.190350578064785410, 0.140653259715525919, 0.063092092629978553]
+_BETWEEN = [0.204432940075298892, 0.169004726639267903, 0.104790010322250184, 0.022935322010529225]
+_PLACES = [0.207784955007898468, 0.586087235467691130, 0.864864423359769073, 0.991455371120812639]
+_GAUSS, _COARSE = np.polynomial.legendre.leggauss(7)
+_NODES = np.concatenate([_GAUSS, _PLACES, np.negative(_PLACES)])
+_FINE = np.concatenate([_WEIGHTS[:0:-1], _WEIGHTS, _BETWEEN, _BETWEEN])
 
 
 def integrate(
@@ -65,7 +58,7 @@ def integrate(
         omega = np.where(turned[:, None], 1.0 / at, at)
         weight = half * np.where(turned[:, None], omega**2, 1.0)
         values = np.asarray(density(omega.ravel())).reshape(-1, *omega.shape) * weight
-        fine, coarse = values @ _FINE, values @ _COARSE
+        fine, coarse = values @ _FINE, values[..., :7] @ _COARSE
         return fine, np.abs(fine - coarse)
 
     spans = np.column_stack([start, start + width])

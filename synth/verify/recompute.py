@@ -11,7 +11,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -69,9 +70,6 @@ class LawMatrices:
     @cached_property
     def _triangular(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """T, upper triangular, and B and C in its coordinates."""
-        if not len(self.A):
-            none, B, C = (np.asarray(m, dtype=np.complex128) for m in (self.A, self.B, self.C))
-            return none, B, C
         balanced, (scale, _) = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
         T, turned = scipy.linalg.schur(balanced, output="complex")
         return T, turned.conj().T @ (self.B / scale[:, None]), (self.C * scale) @ turned
@@ -119,23 +117,17 @@ class Loop:
 
         return difference
 
-    def transfer(
-        self, s: ComplexArray, outputs: Sequence[str], disturbances: Sequence[str]
-    ) -> ComplexArray:
-        """Return the closed-loop responses, (k, outputs, disturbances)."""
-        return self.transfers(s, outputs, disturbances, ())[0]
-
     def transfers(
         self,
         s: ComplexArray,
         outputs: Sequence[str],
         disturbances: Sequence[str],
-        shown: Sequence[complex],
+        shown: Sequence[complex] = (),
     ) -> tuple[ComplexArray, list[ComplexArray]]:
-        """Return `transfer`, and its column of the hook's heave by what the unit shows of that.
+        """Return the closed-loop responses, (k, outputs, disturbances), and some to the hook.
 
-        The reference unit shows it over what it should show, with its gain and phase error [-].
-        The columns are (k, outputs), none where the hook is no disturbance.
+        Those are columns (k, outputs) by what the reference unit shows of the hook's heave, over
+        what it should, with its gain and phase error [-]; none if the hook is no disturbance.
         """
         blocks, law = self.blocks(s, outputs, disturbances), self.law(s)
         matrix = self._matrix(law, blocks)
@@ -177,7 +169,6 @@ def moments(
     sources: Sequence[SpectralSource],
     *,
     orders: Sequence[int] = (0, 2),
-    pairs: Mapping[str, Sequence[str]] | None = None,
     rtol: float = 1e-8,
     delay: float = 0.0,
 ) -> dict[str, tuple[float, ...]]:
@@ -196,8 +187,6 @@ def moments(
         What shakes it; one without a band makes the integral run over the half line.
     orders
         The moments' orders, 0 the first.
-    pairs
-        Outputs whose correlation is wanted, two by its name, from the variance of their sum.
     rtol
         Relative accuracy.
     delay
@@ -209,8 +198,7 @@ def moments(
         If it does not converge: the integral does not exist, or a spectrum is wild.
     """
     views = [(1.0 + 0.0j, sources)]
-    how = partial(moments_of_views, orders=orders, rtol=rtol, delay=delay)
-    return how(loop, outputs, views, pairs=pairs or {})[0]
+    return moments_of_views(loop, outputs, views, orders=orders, rtol=rtol, delay=delay)[0]
 
 
 def moments_of_views(
@@ -218,7 +206,7 @@ def moments_of_views(
     outputs: Sequence[str],
     views: Sequence[tuple[complex, Sequence[SpectralSource]]],
     *,
-    pairs: Mapping[str, Sequence[str]],
+    pairs: Mapping[str, Sequence[str]] = MappingProxyType({}),
     orders: Sequence[int] = (0, 2),
     rtol: float = 1e-8,
     delay: float = 0.0,
@@ -226,7 +214,8 @@ def moments_of_views(
     """Return `moments` for each of several views of what shakes a loop, all in one go.
 
     A view is what the reference unit shows, see `Loop.transfers`, and the sources; these have the
-    same names in all views.
+    same names in all views.  With `pairs`, two outputs by a name, it tells their correlation too,
+    by the variance of their sum.
     """
     every = {id(source): source for _, sources in views for source in sources}
     names = [source.name for source in views[0][1]]

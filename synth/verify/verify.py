@@ -100,7 +100,6 @@ class _Winch:
     """A design on its plants."""
 
     design: DesignClaims
-    _plants: dict[int, LinearPlant] = field(default_factory=dict)
     _loops: dict[tuple[int, bool], CheckedLoop] = field(default_factory=dict)
 
     @cached_property
@@ -173,31 +172,22 @@ class _Winch:
             return "the case's own one-spring rope"
         return f"a rope of {self.more_masses} masses (undamped, so its modes have no end)"
 
-    def _plant(self, masses: int) -> LinearPlant:
-        """Return the plant that moves, on some rope masses."""
-        if masses not in self._plants:
-            case, drag, friction = self.design.case, self.design.drag, self.design.friction
-            plant = sensed_plant(case, masses=masses, drag=drag, friction=friction)
-            heard = self.design.controller.measurements
-            self._plants[masses] = plant.select(measurements=heard)
-        return self._plants[masses]
-
-    def _without_losses(self, masses: int) -> LinearPlant:
-        """Return that plant without the friction of losses that switch."""
-        plant, friction = self._plant(masses), self.design.friction
-        return plant.with_element(_SPEED, LOAD, friction) if friction else plant
-
-    def _lumped(self, masses: int, *, friction: bool) -> CheckedLoop:
-        """Return the loop on some rope masses, with or without that friction."""
-        key = masses, friction
+    def _lumped(self, masses: int, *, rubbing: bool) -> CheckedLoop:
+        """Return the loop on some rope masses, with friction of losses that switch or without."""
+        key, design = (masses, rubbing), self.design
         if key not in self._loops:
-            plant = self._plant(masses) if friction else self._without_losses(masses)
-            controller = self.design.controller
-            self._loops[key] = CheckedLoop.of(plant, controller, self.sources, self.demands, ())
+            if rubbing or not design.friction:
+                drag, friction = design.drag, design.friction
+                plant = sensed_plant(design.case, masses=masses, drag=drag, friction=friction)
+                plant = plant.select(measurements=design.controller.measurements)
+            else:
+                plant = self._lumped(masses, rubbing=True).plant
+                plant = plant.with_element(_SPEED, LOAD, design.friction)
+            self._loops[key] = CheckedLoop.of(plant, design.controller, self.sources, {}, ())
         return self._loops[key]
 
     def _line(
-        self, friction: float, masses: int | None, s: ComplexArray, disturbances: Sequence[str]
+        self, friction: float, masses: int, s: ComplexArray, disturbances: Sequence[str]
     ) -> PlantResponse:
         return sensed_line_at(
             self.design.case,
@@ -210,27 +200,24 @@ class _Winch:
             masses=masses,
         )
 
-    def _known_in_closed_form(self, masses: int) -> bool:
-        """Whether so many masses are: a tip is in series with a lumped rope of another law."""
-        data = self.data
-        uniform = math.isinf(data.tip_stiffness) or data.damping_law == "hysteretic"
-        return self.distributed and masses > 1 and uniform
-
     @cached_property
     def coarse_plant(self) -> LinearPlant:
         """The design's plant."""
-        return self._plant(self.design.masses)
+        return self._lumped(self.design.masses, rubbing=bool(self.design.friction)).plant
 
     def _loop(self, masses: int, own: Iterable[str], *, rope: bool) -> CheckedLoop:
         """Return the loop on some rope masses, or on the rope itself, without losses beside it."""
         found: CheckedLoop | None = None
+        # A lumped rope is a closed form too, unless a tip is in series with its end alone.
+        uniform = math.isinf(self.data.tip_stiffness) or self.data.damping_law == "hysteretic"
+        waves = self.distributed and masses > 1 and uniform
         for friction in (0.0, self.design.friction) if self.design.friction else (0.0,):
-            lumped = self._lumped(masses, friction=bool(friction))
-            found = replace(lumped, own=own, still=found)
-            if not rope and self._known_in_closed_form(masses):
-                found = replace(found, exact=partial(self._line, friction, masses))
+            lumped = self._lumped(masses, rubbing=bool(friction))
+            found = replace(lumped, demands=self.demands, own=own, still=found)
+            if rope or waves:
+                line = partial(self._line, friction, 0 if rope else masses)
+                found = replace(found, exact=line)
             if rope:
-                found = replace(found, exact=partial(self._line, friction, None))
                 # A mode with hardly any damping is narrower than its place on masses is off by.
                 begins = np.concatenate([found.marks, self.data.damped_modes(_HELD_MODES)])
                 near = roots_near(partial(_near_pole, found), begins[begins.imag > 0.0])
@@ -298,7 +285,7 @@ class _Winch:
         """Return the check of the poles without drag, which in small motion there is none of."""
         if self.design.case.payload.fixed_drag is not None or self.data.quadratic_drag == 0.0:
             return []
-        plant = self._without_losses(self.more_masses)
+        plant = self._lumped(self.more_masses, rubbing=False).plant
         plant = plant.with_element(VELOCITY, _DRAG, self.design.drag)
         fastest = float(np.abs(self.fine.marks).max())
         on = f"a rope of {self.more_masses} masses, without drag"
