@@ -191,7 +191,7 @@ def _optimised(
     if not tuning.ok:
         if tuning.assessment is None or not any(member.drive for member in posed.questions):
             return _family_design(posed, tuning)
-        missed = _best_possible(posed, count, seed, known, progress)
+        missed = _best_possible(posed, tuning, count, seed, known, progress)
         if isinstance(missed, Design):
             return missed
         posed, tuning = _on_the_rope(given, *missed, count, seed, progress)
@@ -372,29 +372,38 @@ def _answer(
     progress: Progress | None,
     *,
     drive: bool = True,
+    only_known: bool = False,
 ) -> tuple[PosedFamily, Tuning]:
     """Return the answer of one member alone, and from where its search ended that of the family.
 
     Where the worst member counts it is the hardest, whose answer is nearly that of all; else the
-    case.  The family stands on the rope masses that the answer of the one alone asks for.
+    case.  The family stands on the rope masses that the answer of the one alone asks for.  With
+    `only_known` the search begins at known points alone.
     """
     family = posed.problem if drive else posed.without_drive
     one = 0
     if len(posed.questions) > 1 and posed.objective is Objective.WORST:
         one = hardest(family, seed)
     alone = family.scenarios[one].problem
-    tuning = tuning_of(alone, no_worse(alone, search(alone, starts, seed, known, progress), known))
+    found = search(alone, starts, seed, known, progress, only_guesses=only_known)
+    tuning = tuning_of(alone, no_worse(alone, found, known))
     if len(posed.questions) == 1:
         return posed, tuning
     posed = posed.on(_fitted(posed.alone(one), tuning).masses)
+    last = not drive or not any(question.drive for question in posed.questions)
+    if not last and tuning.assessment is not None and tuning.found.excess > KEPT:
+        return posed, tuning  # what one member cannot keep the family cannot
     family = posed.problem if drive else posed.without_drive
     again = _again(family, tuning, starts, seed, progress, known, anew=True)
-    last = not drive or not any(question.drive for question in posed.questions)
     if not again.ok and last and len(posed.questions) > posed.given:
         agreed = tuning.ok
         if one >= posed.given:
             given = FamilyProblem(scenarios=family.scenarios[: posed.given])
-            agreed = agreed or tuning_of(given, search(given, starts, seed, known, progress)).ok
+            begins = [s.begin for s in tuning.starts[:_RESUMED]]
+            if again.found.solved is not None:
+                begins = [again.found.solved.values, *begins]
+            found = search(given, 1, seed, begins, progress, only_guesses=True)
+            agreed = agreed or tuning_of(given, found).ok
         if agreed:
             again = replace(again, status=_damped_too_little(posed, again))
     return posed, again
@@ -488,6 +497,7 @@ def _where_it_stands(family: FamilyProblem, found: Found) -> Found | None:
 
 def _best_possible(
     posed: PosedFamily,
+    missed: Tuning,
     starts: int,
     seed: int,
     known: Sequence[Sequence[float]],
@@ -497,8 +507,14 @@ def _best_possible(
 
     Or the answer in the sea asked for, where that is feasible after all.
     """
-    case = posed.first.case
-    posed, free = _answer(posed, starts, seed, known, progress, drive=False)
+    case, solved = posed.first.case, missed.found.solved
+    alike = False
+    if solved is not None and missed.found.excess > KEPT:
+        # Where no limit of the drive is in the way, the others exclude each other without it too.
+        drive = {limit.name for question in posed.questions for limit in question.drive}
+        alike = not any(own[name] for own in solved.prices for name in drive & own.keys())
+        known = [[float(v) for v in solved.values], *known] if alike else known
+    posed, free = _answer(posed, starts, seed, known, progress, drive=False, only_known=alike)
     if not free.ok:
         status = free.status
         if not status.startswith(_NO_DESIGN):

@@ -38,6 +38,7 @@ _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best on
 _LONGER = 5  # how often a rough descent that ran out of steps goes on
 _RESERVE = 16  # further starts for a search of which none arrived
 _VIOLATION = 3  # starts of the least violation
+_BROKEN = 1e-3  # least violation from which the limits exclude each other
 _BEST_STARTS = 6  # of the search for the best of one member alone
 
 
@@ -142,7 +143,14 @@ def search(
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
-    places = _places(family, begins, reference, count, len(kept), share * _ENOUGH, tell)
+    places = _places(family, begins[:count], reference, len(kept), share * _ENOUGH, tell)
+    if not kept_only and not any(place.arrived for place in places):
+        least = least_violation(family, begins, reference)
+        if not least.objective <= _BROKEN:
+            return _violated(family, least, _records(places), reference)
+        for begin in [least.values, *begins[count:]]:
+            if _come_by(family, places, begin, least.coefficients, reference).arrived:
+                break
     if hops and not only_guesses:
         _hopped(family, places, reference, starts, seed, tell)
     if kept_only:
@@ -151,15 +159,7 @@ def search(
     if not first and kept_only:
         return Found(solved=None, starts=records, reference=reference)
     if not first:
-        solved = least_violation(family, begins, reference)
-        assessments, excess = assess(family, solved)
-        return Found(
-            solved=solved,
-            assessments=assessments,
-            excess=max(excess, 1.0),
-            starts=records,
-            reference=reference,
-        )
+        return _violated(family, least_violation(family, begins, reference), records, reference)
     answers = distinct(first, _POLISHED)
     best: tuple[Solution, tuple[Assessment, ...], float] | None = None
     origin = answers[0]
@@ -183,11 +183,24 @@ def search(
     )
 
 
+def _violated(
+    family: FamilyProblem, least: Solution, records: tuple[Start, ...], reference: FloatArray
+) -> Found:
+    """Return the least violation as what was found."""
+    assessments, excess = assess(family, least)
+    return Found(
+        solved=least,
+        assessments=assessments,
+        excess=max(excess, 1.0),
+        starts=records,
+        reference=reference,
+    )
+
+
 def _places(
     family: FamilyProblem,
     begins: Sequence[FloatArray],
     reference: FloatArray,
-    count: int,
     guesses: int,
     enough: int,
     tell: Progress,
@@ -195,13 +208,11 @@ def _places(
     """Return where starts roughly lead, until enough of them agree."""
     places: list[_Place] = []
     for k, begin in enumerate(begins):
-        if k >= count and any(place.arrived for place in places):
-            break  # the reserve is for a search of which no start has arrived yet
         if k >= guesses + _LEAST and _agreed(places, enough):
             break
-        tell("starts", min(k, count - 1), count)
+        tell("starts", k, len(begins))
         _come_by(family, places, begin, start_coefficients(family), reference)
-    tell("starts", count, count)
+    tell("starts", len(begins), len(begins))
     return places
 
 
@@ -292,14 +303,17 @@ def _descents(
         if end.converged and family.stable(end.values, end.coefficients):
             place.solved = end
     tell("descents", len(ranked), len(ranked))
-    records, first = [], []
-    for place in places:
-        end = place.solved or place.coarse
-        stable = bool(np.isfinite(end.objective) and family.stable(end.values, end.coefficients))
-        arrived = place.solved is not None
-        records += [Start.of(begin, end, stable=stable and arrived) for begin in place.begins]
-        first += [end] * (len(place.begins) if arrived else 0)
-    return tuple(records), first
+    first = [p.solved for p in places if p.solved is not None for _ in p.begins]
+    return _records(places), first
+
+
+def _records(places: Sequence[_Place]) -> tuple[Start, ...]:
+    """Return the records of the starts that came by some places."""
+    return tuple(
+        Start.of(begin, place.solved or place.coarse, stable=place.solved is not None)
+        for place in places
+        for begin in place.begins
+    )
 
 
 class _Place:

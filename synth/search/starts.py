@@ -31,7 +31,7 @@ from ..structures import pace
 from .nodes import around, cost_nodes, margin_nodes
 
 _CANDIDATES = 512
-_TRIED = 64  # candidates that say which member of a family is the hardest
+_TRIED = 128  # candidates that say which member of a family is the hardest
 _ENOUGH = 8  # stable ones: no more are made of unstable ones
 _SCATTERED = 7  # candidates about an answer (a power of two)
 _FROM_ZERO = 0.1  # of its scale: about which a parameter is scattered that is smaller
@@ -84,16 +84,20 @@ def begin_points(
 
 
 def hardest(family: FamilyProblem, seed: int) -> int:
-    """Return the member that candidates do worst with: unstable, with limits broken, or dear."""
-    first = family.scenarios[0]
-    points = candidates(first.problem, _TRIED, seed)
+    """Return the member that drawn points do worst with: unstable, with limits broken, or dear.
+
+    Of members as hard it is the last, as those of the least damping come last.
+    """
+    first = family.scenarios[0].problem
+    points = _drawn(first, _TRIED, seed, crossover_grid(first))
     burdens = []
     for scenario in family.scenarios:
         alone = FamilyProblem(scenarios=(scenario,))
         stable = np.array([point for point in points if alone.stable(point)])
         merits = _merits(alone, stable)[0] if len(stable) else np.zeros(0)
-        burdens.append(np.minimum(merits, _WORST).sum() + _WORST * (len(points) - len(stable)))
-    return int(np.argmax(burdens))
+        unstable = len(points) - len(stable)
+        burdens.append(np.minimum(merits, _WORST).sum() + 2.0 * _WORST * unstable)
+    return len(burdens) - 1 - int(np.argmax(burdens[::-1]))
 
 
 def scattered(
@@ -130,13 +134,18 @@ def _picked(
 
 def candidates(problem: Problem, count: int, seed: int) -> FloatArray:
     """Return candidate parameter vectors, stable or not: the law's guesses and `count` drawn."""
-    law = problem.law
-    sampler = qmc.Sobol(law.dimensions, seed=seed)
-    points = sampler.random_base2(int(np.ceil(np.log2(count))))[:count]
     omega = crossover_grid(problem)
+    drawn = _drawn(problem, count, seed, omega)
+    return np.vstack([problem.law.guesses(problem, omega), drawn])
+
+
+def _drawn(problem: Problem, count: int, seed: int, omega: FloatArray) -> FloatArray:
+    """Return parameter vectors drawn for crossovers at some frequencies, stable or not."""
+    sampler = qmc.Sobol(problem.law.dimensions, seed=seed)
+    points = sampler.random_base2(int(np.ceil(np.log2(count))))[:count]
     # A hair off the imaginary axis, where an undamped pole cannot be hit.
     yu = problem.plant.response_at((1e-3 + 1j) * omega).yu
-    return np.vstack([law.guesses(problem, omega), law.draw(points, omega, yu)])
+    return np.asarray(problem.law.draw(points, omega, yu), dtype=np.float64)
 
 
 def others_of(problem: Problem, seed: int) -> FloatArray:
