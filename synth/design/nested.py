@@ -15,9 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..question import GAINS, DesignQuestion, FamilyProblem, Problem, pose
-from ..search import KEPT, Found, Progress, Solution, polish, search
+from ..search import KEPT, Found, Progress, Solution, glanced, polish, search
 from ..structures import TRANSPARENT, LowOrderFeedback, ParametrisedController, WinchLaw
-from .tuning import Tuning, tuning_of
 
 _FEW = 4  # starts of a structure within another
 _BETTER = 1e-6  # of the log cost that counts as better
@@ -64,13 +63,18 @@ def nested_starts(
     found: list[list[float]] = []
     for name in within:
         inner = pose(question.case, name, question.masses)
-        tuning = _answer(inner, min(starts, _FEW), seed, progress)
-        if tuning.controller is None:
+        known = nested_starts(inner, min(starts, _FEW), seed, progress)
+        problem, count = inner.problem_with(inner.loop), min(starts, _FEW) + len(known)
+        solved = search(problem, count, seed, known, progress, roughly=True).solved
+        if solved is None:
             continue
+        values = [float(v) for v in solved.values]
+        parameters = problem.law.named(values)
         if isinstance(structure, LowOrderFeedback):
-            found.append(structure.start(question.law, tuning.parameters, tuning.controller))
+            controller = problem.law.controller(values)
+            found.append(structure.start(question.law, parameters, controller))
             continue
-        found += starts_from(question, [tuning.parameters])
+        found += starts_from(question, [parameters])
     return found
 
 
@@ -93,14 +97,6 @@ def starts_from(
         if isinstance(question.law, WinchLaw) and "heave.gain" not in guess:
             found += question.law.fed(values, question.problem_with(question.loop))
     return found
-
-
-def _answer(question: DesignQuestion, starts: int, seed: int, progress: Progress | None) -> Tuning:
-    """Return the answer of a structure within another, good enough to begin with."""
-    guesses = nested_starts(question, starts, seed, progress)
-    problem = question.problem_with(question.loop)
-    count = starts + len(guesses)
-    return tuning_of(problem, search(problem, count, seed, guesses, progress, hops=False))
 
 
 def gains_in_use(question: DesignQuestion) -> list[list[float]]:
@@ -131,8 +127,8 @@ def no_worse(
     for values in starts:
         best = found.solved.objective if found.solved is not None else np.inf
         best = best if found.excess <= KEPT else np.inf
-        solved = _as_it_is(family, values)
-        if solved is None or solved.objective > best - _BETTER:
+        solved = _as_it_is(family, values, best - _BETTER)
+        if solved is None:
             continue
         again, assessments, excess = polish(family, solved, np.array(values, dtype=np.float64))
         if again.converged and excess <= KEPT and again.objective < best:
@@ -140,19 +136,22 @@ def no_worse(
     return found
 
 
-def _as_it_is(family: FamilyProblem, values: Sequence[float]) -> Solution | None:
-    """Return a known point as an answer; None if it is unstable or breaks a limit."""
+def _as_it_is(family: FamilyProblem, values: Sequence[float], most: float) -> Solution | None:
+    """Return a known point as an answer; None if it is unstable, dearer or breaks a limit."""
     if not family.stable(values):
         return None
-    loops = [(s.problem, s.problem.assess(s.values(values))) for s in family.scenarios]
-    known = tuple(seen.coefficients for _, seen in loops)
-    if not family.stable(values, known):
-        return None
-    if any(lim.use(lim.worst(seen)) > 1.0 + KEPT for asked, seen in loops for lim in asked.limits):
+    seen = [glanced(s.problem, s.values(values)) for s in family.scenarios]
+    loops = [(s.problem, g) for s, g in zip(family.scenarios, seen, strict=True) if g is not None]
+    known = tuple(loop.coefficients for _, loop in loops)
+    if len(loops) < len(seen) or not family.stable(values, known):
         return None
     costs = np.sqrt(
-        [sum(w * seen.sigma(z) ** 2 for z, w in asked.minimise.items()) for asked, seen in loops]
+        [sum(w * loop.sigma(z) ** 2 for z, w in asked.minimise.items()) for asked, loop in loops]
     )
+    if np.log(family.total(costs)) + _HAIR > most:
+        return None
+    if any(lim.use(lim.worst(loop)) > 1.0 + KEPT for asked, loop in loops for lim in asked.limits):
+        return None
     return Solution(
         values=np.array(values, dtype=np.float64),
         coefficients=known,

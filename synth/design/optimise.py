@@ -386,9 +386,9 @@ def _answer(
         one = hardest(family, seed)
     alone = family.scenarios[one].problem
     found = search(alone, starts, seed, known, progress, only_guesses=only_known)
-    tuning = tuning_of(alone, no_worse(alone, found, known))
     if len(posed.questions) == 1:
-        return posed, tuning
+        return posed, tuning_of(alone, no_worse(alone, found, known))
+    tuning = tuning_of(alone, found)
     posed = posed.on(_fitted(posed.alone(one), tuning).masses)
     last = not drive or not any(question.drive for question in posed.questions)
     if not last and tuning.assessment is not None and tuning.found.excess > KEPT:
@@ -451,11 +451,11 @@ def _again(
     if family.objective is Objective.REGRET:
         family = with_bests(family, seed, ends, progress)
     standing = None
+    wide = False
     if tuning.ok and family.objective is not Objective.REGRET:
-        standing = _where_it_stands(family, tuning.found)
+        standing, wide = _where_it_stands(family, tuning.found), anew
     found = standing
     if standing is None:
-        wide = anew and tuning.ok and family.objective is not Objective.REGRET
         found = search(family, starts if wide else 1, seed, ends, progress, only_guesses=not wide)
     elif better := [s for s in others[1:] if s.cost < family.total(standing.costs)]:
         # What was better before may break the limits of the others: then the answer stands.
@@ -467,7 +467,7 @@ def _again(
         tuning = replace(tuning, starts=tuple(tried))
     assert found is not None
     again = tuning_of(family, no_worse(family, found, known))
-    if not again.ok and tuning.ok:
+    if not again.ok and tuning.ok and not wide:
         again = tuning_of(family, search(family, starts, seed, ends[:1], progress))
     return replace(again, starts=tuning.starts, agreed=tuning.agreed)
 

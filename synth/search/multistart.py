@@ -32,6 +32,7 @@ _ENOUGH, _MOST = 4, 0.6  # starts, and share of all, that come by one place: no 
 _SCATTER, _MOST_SCATTER = 2, 12  # starts about the best, by parameter, and most
 _HOPS = (1.5, 1.5, 1.5, 2.5)  # how far they begin from it, in decades, as long as that helps
 _AS_GOOD = 5e-3  # of the log cost, by which rough answers may differ that are as good
+_AHEAD, _ALIKE = 3e-4, 2e-3  # ... before and behind the end that a rough answer is on the way to
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
 _POLISHED = 6  # distinct answers that are polished at most
 _BEHIND = 0.2  # of the log cost, that a rough answer may lie behind the best one
@@ -120,15 +121,15 @@ def search(
     *,
     only_guesses: bool = False,
     kept_only: bool = False,
-    hops: bool = True,
+    roughly: bool = False,
 ) -> Found:
     """Return the best answer of a multi-start search over a family.
 
     `starts` and `seed` are its size and seed.  It begins with guesses of the searched
     parameters before any that are drawn.  With `only_guesses` nothing is drawn: it starts from the
     guesses alone, if any of them is stable.  With `kept_only` it looks for nothing else where no
-    start roughly arrives at an answer that keeps the limits.  Without `hops` it does not look about
-    the best.  `progress` is called as progress(stage, done, total).
+    start roughly arrives at an answer that keeps the limits.  If `roughly`, the best place to which
+    starts lead is the answer.  `progress` is called as progress(stage, done, total).
     """
     tell = progress or (lambda stage, done, total: None)
     family = FamilyProblem.of(asked)
@@ -144,6 +145,8 @@ def search(
         return Found(solved=None)
     reference = briskest(family, begins)
     places = _places(family, begins[:count], reference, len(kept), share * _ENOUGH, tell)
+    if roughly:
+        return Found(solved=min(places, key=lambda p: (not p.arrived, p.coarse.objective)).coarse)
     if not kept_only and not any(place.arrived for place in places):
         least = least_violation(family, begins, reference)
         if not least.objective <= _BROKEN:
@@ -151,7 +154,7 @@ def search(
         for begin in [least.values, *begins[count:]]:
             if _come_by(family, places, begin, least.coefficients, reference).arrived:
                 break
-    if hops and not only_guesses:
+    if not only_guesses:
         _hopped(family, places, reference, starts, seed, tell)
     if kept_only:
         places = [place for place in places if place.arrived]
@@ -234,8 +237,8 @@ def _come_by(
         if coarse.message != UNFINISHED or coarse.objective > best + _BEHIND:
             break
         coarse = rough(coarse.values, coarse.coefficients, exact=exact)
-    if not exact and coarse.converged and coarse.objective < best:
-        # The best so far by a margin that leaks between the nodes, maybe.
+    if coarse.converged and coarse.objective < best:
+        # The best so far by nodes for the loop where it began, or a margin that leaks, maybe.
         coarse = rough(coarse.values, coarse.coefficients, exact=True)
     place = next((p for p in places if _same(family, p.coarse, coarse)), None)
     if place is None:
@@ -289,7 +292,8 @@ def _descents(
     drags = start_coefficients(family)
     ranked = sorted(places, key=lambda p: (not p.arrived, p.coarse.objective))[: max(1, starts)]
     for k, place in enumerate(ranked):
-        best = min((p.solved.objective for p in ranked if p.solved is not None), default=np.inf)
+        ends = [p.solved for p in ranked if p.solved is not None]
+        best = min((end.objective for end in ends), default=np.inf)
         if place.coarse.objective > best + _BEHIND:
             break
         if not place.arrived and _agreed(places):
@@ -299,6 +303,15 @@ def _descents(
         near = place.coarse.converged
         values = place.coarse.values if near else place.begins[0]
         found = place.coarse.coefficients if near else drags
+        if np.isfinite(best):
+            # By true margins, but roughly still: along a flat valley it often comes by a known end.
+            rough = settle(family, values, found, reference=reference, exact=True, rounds=1)
+            if rough.converged:
+                values, found = rough.values, rough.coefficients
+                behind = ((rough.objective - end.objective, end) for end in ends)
+                place.solved = next((s for b, s in behind if -_AHEAD < b < _ALIKE), None)
+            if place.solved is not None:
+                continue
         end = settle(family, values, found, reference=reference, exact=True)
         if end.converged and family.stable(end.values, end.coefficients):
             place.solved = end

@@ -6,6 +6,7 @@ start -> nodes for its poles -> descent -> nodes for the new poles -> ... -> Sol
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -105,13 +106,13 @@ def settle(
         Where the variable of the goal begins.
     rounds
         Most renewals of the nodes; the first of them, far from the answer, holds margins by discs,
-        which see a limit before it is broken.  One alone goes only roughly to the end.
+        which see a limit before it is broken.  One alone goes only roughly to the end, if not fine.
     reach, tighten
         See `Programme.solve`.
     """
     last: Solution | None = None
     iterations = 0
-    for k in range(_FINE_ROUNDS if fine else rounds):
+    for k in range(rounds):
         programme = stated(
             asked,
             values,
@@ -119,7 +120,7 @@ def settle(
             goal,
             reference=reference,
             relaxed=relaxed,
-            rough=rounds == 1,
+            rough=rounds == 1 and not fine,
             fine=fine,
             exact=exact or fine or k > 0,
         )
@@ -154,21 +155,19 @@ def polish(
     tighten: dict[tuple[int, str], float] = {}
     best: tuple[Solution, tuple[Assessment, ...], float] | None = None
     rough = solved
+    fine = partial(settle, family, goal=goal, reference=reference, relaxed=relaxed, fine=True)
+    # Of costs it is seen at the end whether nodes for the loop at the start were right.
+    rounds = 1 if goal is Goal.COST else _FINE_ROUNDS
     for _ in range(1 + _HAIRS):
-        found = settle(
-            family,
-            solved.values,
-            solved.coefficients,
-            goal,
-            reference=reference,
-            relaxed=relaxed,
-            extra=solved.extra,
-            fine=True,
-            tighten=tighten,
-        )
+        start = solved.values, solved.coefficients
+        found = fine(*start, extra=solved.extra, tighten=tighten, rounds=rounds)
         sound = np.isfinite(found.objective) and family.stable(found.values, found.coefficients)
         if sound:
             assessments, overs = _measured(family, found, goal, relaxed)
+            right = found.converged and _off(family, found, assessments) < _FINE_SETTLED
+            if rounds == 1 and not right:
+                solved, rounds = found, _FINE_ROUNDS
+                continue
             excess = max([0.0, *overs.values()])
             if best is None or (excess > KEPT, found.objective) < (
                 best[2] > KEPT,
@@ -221,6 +220,15 @@ def _measured(
         if limit.name not in relaxed
     }
     return tuple(assessments), overs
+
+
+def _off(family: FamilyProblem, solved: Solution, assessments: Sequence[Assessment]) -> float:
+    """Return what the costs on a programme's nodes are off by, relatively, at most."""
+    off = [0.0]
+    for scenario, cost, seen in zip(family.scenarios, solved.costs, assessments, strict=True):
+        terms = (w * seen.sigma(z) ** 2 for z, w in scenario.problem.minimise.items())
+        off.append(abs(0.5 * np.log(sum(terms) / cost**2)))
+    return float(max(off))
 
 
 def own_limits(family: FamilyProblem) -> list[tuple[int, Limit]]:

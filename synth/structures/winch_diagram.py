@@ -35,7 +35,6 @@ from models.basics import ComplexArray, FloatArray, InputError, check_range, pic
 from models.plant import MEASUREMENTS, LinearPlant
 from models.sensing import MEASURED
 
-from ..loop import Disturbance
 from .blocks import FilterSection, lead_time
 from .diagram import Branch, DiagramLaw, Weight
 from .drum_speed import SteadyMotion
@@ -279,13 +278,12 @@ class WinchLaw(DiagramLaw):
         loop = 1.0 - sum(c * response.yu[:, j, 0] for j, c in enumerate(none))
         # Normal equations of each candidate: of what gain, and gain times lead, make of the motion.
         matrix, right = np.zeros((len(rows), 2, 2)), np.zeros((len(rows), 2, 1))
-        densities = [_density(d, response.omega) for d in problem.disturbances]
+        shaken = _shaken(problem, response.omega)
         for output, weight in problem.minimise.items():
             z = response.outputs.index(output)
             through = response.zu[:, z, 0] / loop
-            for disturbance, density in zip(problem.disturbances, densities, strict=True):
-                w = response.disturbances.index(disturbance.name)
-                size = np.sqrt(weight * density * np.gradient(response.omega))
+            for name, variances in shaken.items():
+                w, size = response.disturbances.index(name), np.sqrt(weight * variances)
                 before, after, later = (
                     through * sum(c * response.yw[:, j, w] for j, c in enumerate(law)) * size
                     for law in (none, one, ahead)
@@ -301,13 +299,14 @@ class WinchLaw(DiagramLaw):
         return found
 
 
-def _density(disturbance: Disturbance, omega: FloatArray) -> FloatArray:
-    """Return the density of a disturbance where it has a band, and zero elsewhere, (k,)."""
-    density = disturbance.density(omega)
-    if disturbance.band is None:
-        return density
-    low, high = disturbance.band
-    return density * ((omega >= low) & (omega <= high))
+def _shaken(problem: GeneralisedPlant, omega: FloatArray) -> dict[str, FloatArray]:
+    """Return the variance of each disturbance about some frequencies [rad/s], by name."""
+    found = {}
+    for disturbance in problem.disturbances:
+        low, high = disturbance.band or (-np.inf, np.inf)
+        density = disturbance.density(omega) * ((omega >= low) & (omega <= high))
+        found[disturbance.name] = np.asarray(density * np.gradient(omega))
+    return found
 
 
 def _product(factor: float, *names: str) -> Weight:
