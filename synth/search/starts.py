@@ -33,7 +33,8 @@ from .nodes import around, cost_nodes, margin_nodes
 _CANDIDATES = 512
 _TRIED = 128  # candidates that say which member of a family is the hardest
 _ENOUGH = 8  # stable ones: no more are made of unstable ones
-_SCATTERED = 7  # candidates about an answer (a power of two)
+_SCATTERED = 128  # candidates about an answer (a power of two)
+_SCATTERS, _FEW = 8, 4  # how often as many are drawn at most, where fewer are stable
 _FROM_ZERO = 0.1  # of its scale: about which a parameter is scattered that is smaller
 _SPREAD = 0.5  # least distance of two starts, in decades over all parameters
 _LEASH = 1e-3  # price of moving a parameter by a factor of e, squared
@@ -108,12 +109,17 @@ def scattered(
     Up to `far` decades either way in every parameter at once, for the answers that lie where a
     parameter has gone to its end or is of another order: few descents from elsewhere lead there.
     """
-    drawn = qmc.Sobol(values.size, seed=seed).random_base2(_SCATTERED)
+    sampler = qmc.Sobol(values.size, seed=seed)
     middle = np.copysign(np.maximum(np.abs(values), _FROM_ZERO * family.scales), values)
     low, high = np.array([(p.low, p.high) for p in family.parameters]).T
-    points = np.clip(middle * 10.0 ** (far * (2.0 * drawn - 1.0)), low, high)
-    stable = np.array([point for point in points if family.stable(point)])
-    return _picked(family, stable, [np.arange(len(stable))], count)
+    stable: list[FloatArray] = []
+    for _ in range(_SCATTERS):
+        drawn = sampler.random(_SCATTERED)
+        points = np.clip(middle * 10.0 ** (far * (2.0 * drawn - 1.0)), low, high)
+        stable += [point for point in points if family.stable(point)]
+        if len(stable) >= _FEW:
+            break
+    return _picked(family, np.array(stable), [np.arange(len(stable))], count)
 
 
 def _picked(
