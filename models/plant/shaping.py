@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from ..basics import ComplexArray, FloatArray, InputError, ReadOnlyArrays, SolverError
-from .resolvent import Resolvent, Transfer
+from .resolvent import Resolvent
 
 _NODES = 240
 _TAIL_WEIGHT = 0.03  # of the tail's logarithm against the amplitude
@@ -58,13 +58,13 @@ class ShapingFilter(ReadOnlyArrays):
     def density(self, omega: npt.ArrayLike) -> FloatArray:
         """Return the one-sided density of the fitted spectrum per rad/s at `omega` [rad/s]."""
         s = 1j * np.asarray(omega, dtype=np.complex128).reshape(-1)
-        gain = self._gain(s)
+        gain = self._resolvent.between(self.C, self.B)(s)
         assert gain is not None  # the filter is stable
         return np.asarray((np.abs(gain) ** 2 / np.pi).reshape(np.shape(omega)))
 
     @cached_property
-    def _gain(self) -> Transfer:
-        return Resolvent(self.A).between(self.C, self.B)
+    def _resolvent(self) -> Resolvent:
+        return Resolvent(self.A)
 
 
 def fit_shaping_filter(

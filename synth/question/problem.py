@@ -18,8 +18,9 @@ from ..loop import (
     Coefficients,
     Disturbance,
     Element,
+    LinearController,
     LoopBlocks,
-    LoopModel,
+    lively_poles,
     with_delay_models,
     with_elements,
     without_losses,
@@ -29,7 +30,6 @@ from ..structures import ParametrisedController
 Values = Sequence[float] | FloatArray
 
 _SLOW = 1e-4  # no real pole slower than this share of the plant's slowest one
-_KEPT = 4  # sets of poles
 _DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 
 
@@ -133,28 +133,13 @@ class Problem:
     def lively_poles(self, values: Values, *asked: Coefficients | None) -> Iterator[ComplexArray]:
         """Yield the closed loop's poles [1/s] for sets of coefficients, each when it is asked for.
 
-        On as few states as that takes (`synth.loop.LoopModel`), so without damped poles of the
-        plant that no loop moves: what stability is asked of.
+        Without damped poles of the plant that no loop moves: what stability is asked of.
         """
-        controller = self.law.controller([float(v) for v in values])
-        model = _loop_model(self.plant, self.elements)
+        controller = _controller(self.law, tuple(map(float, values)))
         references = [element.reference for element in self.elements]
-        at = tuple(map(float, values))
         for coefficients in asked:
             known = references if coefficients is None else coefficients
-            point = at, tuple(map(float, known))
-            if point not in self._lately:
-                gains = [r - c for r, c in zip(references, known, strict=True)]
-                poles = np.linalg.eigvals(model.closed(controller, gains))
-                while len(self._lately) >= _KEPT:
-                    del self._lately[next(iter(self._lately))]
-                self._lately[point] = np.asarray(poles, dtype=np.complex128)
-            yield self._lately[point]
-
-    @cached_property
-    def _lately(self) -> dict[tuple[tuple[float, ...], tuple[float, ...]], ComplexArray]:
-        """Lively poles asked for last: a step asks whether it is stable, then for rows."""
-        return {}
+            yield lively_poles(self.plant, controller, self.elements, tuple(map(float, known)))
 
     def growth(self, values: Values) -> float:
         """Return the largest real part of a closed-loop pole [1/s], drag as the plant holds it."""
@@ -221,8 +206,9 @@ def _opened(plant: LinearPlant, elements: tuple[Element, ...]) -> LinearPlant:
 
 
 @lru_cache(maxsize=16)
-def _loop_model(plant: LinearPlant, elements: tuple[Element, ...]) -> LoopModel:
-    return LoopModel.of(with_delay_models(_opened(plant, elements))[0])
+def _controller(law: ParametrisedController, values: tuple[float, ...]) -> LinearController:
+    """Return a controller, the same if asked again: a step asks for its poles more than once."""
+    return law.controller(values)
 
 
 def _abscissa(poles: ComplexArray) -> float:
