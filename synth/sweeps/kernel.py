@@ -97,63 +97,56 @@ class SpringLoops:
         # Every variance is sum_m c_m int omega^2m S / |Den|^2, c_m of the output's |numerator|^2:
         # so 1/|Den|^2 is made once, and multiplied once with all powers, weights and rules.
         weights = nodes.sea if shaken.ratios is None else nodes.weights
-        x = (nodes.omega / self.reference) ** 2
+        y = nodes.omega / self.reference
         squares = {name: squared(self._scaled(self._numerators[name]())) for name in orders}
-        highest = max((len(c) + orders[name] - 1 for name, c in squares.items()), default=0)
-        powers = x ** np.arange(highest)[:, None]
-        right = (weights[:, None, :] * powers[None]).reshape(-1, x.size).T.copy()
-        sums = np.empty((len(self), right.shape[1]))
-        even, odd, y = self._halves(self.closed, nodes.omega)
-        step = max(1, CHUNK // x.size)
+        terms = [
+            (name, order, c, m + order)
+            for name, square in squares.items()
+            for m, c in enumerate(square)
+            for order in range(orders[name])
+            if _there(c)
+        ]
+        wanted = sorted({power for *_, power in terms})
+        powers = y ** (2 * np.array(wanted, dtype=np.intp)[:, None])
+        left = (weights[:, None, :] * powers).reshape(-1, y.size)
+        sums = np.empty((len(left), len(self)))
+        even, odd = self._half(0), self._half(1)
+        evens, odds = (y[:, None] ** (2 * np.arange(len(c)) + k) for k, c in enumerate((even, odd)))
+        # Cases are the last axis all along: columns are then written and read as they lie.
+        step = max(1, CHUNK // y.size)
         for at in range(0, len(self), step):
             part = slice(at, at + step)
-            inverse = self._inverse(even[part], odd[part], y)
+            inverse = _inverse(evens @ even[:, part], odds @ odd[:, part])
             if shaken.ratios is not None:
-                inverse *= shaken.ratios[part]
-            np.matmul(inverse, right, out=sums[part])
-        folded = sums.reshape(len(self), len(weights), highest)
-        found = {}
-        for name, square in squares.items():
-            columns = np.zeros((len(self), orders[name], len(weights)))
-            for m, c in enumerate(square):
-                for order in range(orders[name] if _there(c) else 0):
-                    columns[:, order] += c[:, None] * folded[:, :, m + order]
-            columns[:, 1:] *= self.reference**2
-            found[name] = columns * shaken.factors[:, None, None]
-        return found
+                inverse *= shaken.ratios[part].T
+            np.matmul(left, inverse, out=sums[:, part])
+        folded = sums.reshape(len(weights), len(wanted), len(self))
+        found = {name: np.zeros((order, len(weights), len(self))) for name, order in orders.items()}
+        for name, order, c, power in terms:
+            found[name][order] += c * folded[:, wanted.index(power)]
+        for columns in found.values():
+            columns[1:] *= self.reference**2
+            columns *= shaken.factors
+        return {name: columns.transpose(2, 0, 1) for name, columns in found.items()}
 
     def _scaled(self, columns: Columns) -> Columns:
         return [c * self.reference**j for j, c in enumerate(columns)]
 
-    def _table(self, columns: Columns) -> FloatArray:
-        found = np.empty((len(self), len(columns)))
-        for j, column in enumerate(columns):
-            found[:, j] = column
+    def _half(self, first: int) -> FloatArray:
+        """Return every other coefficient of the characteristic polynomial at i y, (m, n)."""
+        half = self.closed[first::2]
+        found = np.empty((len(half), len(self)))
+        for m, column in enumerate(half):
+            np.multiply(column, (-1.0) ** m, out=found[m])
         return found
 
-    def _halves(
-        self, columns: Columns, omega: FloatArray
-    ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
-        """Return even and odd coefficients with their signs, and the powers that they go with."""
-        y = omega / self.reference
-        even, odd = self._table(columns[0::2]), self._table(columns[1::2])
-        even[:, 1::2] *= -1.0
-        odd[:, 1::2] *= -1.0
-        evens = np.stack([y ** (2 * m) for m in range(even.shape[1])])
-        odds = np.stack([y ** (2 * m + 1) for m in range(odd.shape[1])])
-        return even, odd, (evens, odds)
 
-    @staticmethod
-    def _inverse(
-        even: FloatArray, odd: FloatArray, powers: tuple[FloatArray, FloatArray]
-    ) -> FloatArray:
-        """Return 1/|Den|^2, (loops, nodes): real and imaginary part apart, nothing cancels."""
-        real = even @ powers[0]
-        imaginary = odd @ powers[1]
-        np.multiply(real, real, out=real)
-        np.multiply(imaginary, imaginary, out=imaginary)
-        np.add(real, imaginary, out=real)
-        return np.reciprocal(real, out=real)
+def _inverse(real: FloatArray, imaginary: FloatArray) -> FloatArray:
+    """Return 1/|Den|^2 in place of its real part: the two apart, nothing cancels."""
+    np.multiply(real, real, out=real)
+    np.multiply(imaginary, imaginary, out=imaginary)
+    np.add(real, imaginary, out=real)
+    return np.reciprocal(real, out=real)
 
 
 def product(one: Columns, other: Columns) -> Columns:
@@ -190,23 +183,20 @@ def hurwitz(columns: Columns) -> BoolArray:
     A zero in its first column, the boundary, counts as unstable.  The columns are the coefficients
     of s^0 to s^m, each (n,), the highest not zero.
     """
-    degree = len(columns) - 1
-    sign = np.sign(columns[-1])
     with np.errstate(all="ignore"):
-        pace = (np.abs(columns[0]) / np.abs(columns[-1])) ** (1.0 / degree)
-        pace = np.where((pace > 0.0) & np.isfinite(pace), pace, 1.0)
-        lead = columns[-1] * pace**degree
-        scaled = [c * pace**j / lead for j, c in enumerate(columns)]
-        stable = sign != 0.0
-        for c in scaled:
-            stable = stable & (c > 0.0)
-        upper = scaled[degree::-2]
-        lower = scaled[degree - 1 :: -2] if degree else []
+        pace = np.abs(columns[0] / columns[-1]) ** (1.0 / max(len(columns) - 1, 1))
+        scale, slower = 1.0 / columns[-1], 1.0 / np.where((pace > 0.0) & (pace < np.inf), pace, 1.0)
+        scaled, stable = [], columns[-1] != 0.0
+        for c in reversed(columns):
+            scaled.append(c * scale)
+            stable = stable & (scaled[-1] > 0.0)
+            scale = scale * slower
+        upper, lower = scaled[0::2], scaled[1::2]
         while lower:
             stable = stable & (lower[0] > 0.0)
             ratio = upper[0] / lower[0]
-            padded = [*lower[1:], np.zeros(1)]
-            upper, lower = (lower, [u - ratio * p for u, p in zip(upper[1:], padded, strict=False)])
+            rest = [u - ratio * v for u, v in zip(upper[1:], lower[1:], strict=False)]
+            upper, lower = lower, rest + upper[len(lower) :]
     return np.asarray(stable)
 
 
