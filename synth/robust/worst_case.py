@@ -99,9 +99,10 @@ def _figures(limits: Sequence[Limit], member: Member, loops: SolvedRows, index: 
     """Return what gains do to a member, by its index among solved loops."""
     if not loops.stable[index]:
         return _unstable(member)
-    at_rest = {name: float(v[index % v.size]) for name, v in loops.at_rest.items()}
+    at_rest, losses = (
+        {name: float(v[index % v.size]) for name, v in side.items()} for side in loops.holding
+    )
     assessment = _OneLoop(max_sensitivity=float(loops.peak[index]), loops=loops, index=index)
-    losses = {name: float(v[index % v.size]) for name, v in loops.loss.items()}
     use, name = 0.0, ""
     for limit in limits:
         own = _at_rest(limit, at_rest, losses)

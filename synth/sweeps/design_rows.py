@@ -62,9 +62,6 @@ class SolvedRows:
 
     Attributes
     ----------
-    at_rest, loss
-        What holding the load takes, and what losses that switch with the direction carry it to
-        either side of that, by output, (n,) or (1,).
     drag, friction
         Linear drag coefficient, (n,) [N s/m]; friction of losses that switch, (n,) [N m s/rad].
     heave
@@ -88,13 +85,18 @@ class SolvedRows:
         rules: int = 1,
         pairs: Sequence[Pair] = (),
     ) -> None:
-        count, (self.at_rest, self.loss) = len(loops), at_rest(loops.numbers)
+        count, self._numbers = len(loops), loops.numbers
         self.drag, self.heave = np.full(count, np.nan), np.full(count, np.nan)
         self.friction = np.zeros(count)
         self.stable = np.zeros(count, dtype=bool)
         self.peak = np.full(count, np.nan)
         self.moments = {name: np.full((count, k, rules), np.nan) for name, k in orders.items()}
         self.products = {pair: np.full((count, 3, 2), np.nan) for pair in pairs}
+
+    @cached_property
+    def holding(self) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        """What holding the load takes, and its loss to both sides, by output, (n,) or (1,)."""
+        return at_rest(self._numbers)
 
     def signed(self, output: str) -> list[FloatArray]:
         """Return variances of an output and of its rate, (n, 2), by signs of the unit's errors.
@@ -238,7 +240,10 @@ class DesignRows:
                 some = at[k : k + step]
                 own = loops.part(some) if some.size < len(rows) else loops
                 found = self._solved(rows[some], own, self.level_nodes(level))
-                solved.put(some, found)
+                if own is loops:  # all rows at once
+                    solved = found
+                else:
+                    solved.put(some, found)
                 doubtful.append(some[self._doubt(found, level)])
             at = np.concatenate(doubtful) if doubtful else at[:0]
             if not at.size:
@@ -438,7 +443,7 @@ class DesignRows:
                     break
                 drag = _sound(found.drag[rows])
                 speed = chain.moments([SPEED], nodes, shaken, drag)[SPEED][:, 0]
-                before, torque = found.friction[rows], found.loss["motor.torque"]
+                before, torque = found.friction[rows], found.holding[1]["motor.torque"]
                 known = switching_friction(part_of(torque, rows), speed)
                 found.friction[rows] = known
                 if np.all(np.abs(known - before) <= _LOSS_AGREES * known):

@@ -111,7 +111,8 @@ class FrequencyEngine:
 
         Raises InputError if rows do not fit the spread, or a value is out of its range.
         """
-        table = np.atleast_2d(np.asarray(rows, dtype=np.float64))
+        # Column by column, as they are read.
+        table = np.asarray(np.atleast_2d(rows), dtype=np.float64, order="F")
         if table.shape[1] != len(self.spread.paths):
             raise InputError(
                 f"sweep: rows must have {len(self.spread.paths)} columns, got {table.shape[1]}"

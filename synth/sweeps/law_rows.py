@@ -73,7 +73,7 @@ class DesignLaw:
         self._own = dict(parameters)
         self.measurements = tuple(question.structure.measurements)
         self._names = [p.name for p in self.law.parameters]
-        poles = self._poles(self._row(self._own))
+        self._own_poles = poles = self._poles(self._row(self._own))
         self._fixed = {
             p.name
             for p in self.law.parameters
@@ -91,7 +91,7 @@ class DesignLaw:
                 moved.add(name)
         values = tuple(np.broadcast_arrays(*self._row(own)) if "A" in moved else self._row(own))
         if moved & {*self._names} <= self._fixed:
-            poles = self._poles([column[0] for column in values])[None]
+            poles = self._own_poles[None]
         else:
             table = np.stack(np.broadcast_arrays(*values), axis=1)
             poles = np.array([self._poles(row) for row in table])

@@ -1,7 +1,8 @@
 """Metrics of a sweep: names, units, and the outputs of the plant that they need."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -95,17 +96,16 @@ def finished(
 
     Most probable extremes are those of the exposure [s], `Limits.equivalent_exposure`.
     """
-    static, loss = loops.at_rest, loops.loss
-    alone = {
-        "max_sensitivity": loops.peak,
-        "drag": loops.drag,
-        "static_torque": static["motor.torque"] + loss["motor.torque"],
-        "static_tension": static["rope.tension"],
+    alone: dict[str, Callable[[], Any]] = {
+        "max_sensitivity": lambda: loops.peak,
+        "drag": lambda: loops.drag,
+        "static_torque": lambda: sum(side["motor.torque"] for side in loops.holding),
+        "static_tension": lambda: loops.holding[0]["rope.tension"],
     }
     found = {}
     for metric in metrics:
         if not metric.output:
-            value = alone[metric.name]
+            value = alone[metric.name]()
         elif metric.kind == "period":
             value = loops.period(metric.output)
         else:
@@ -113,7 +113,7 @@ def finished(
         if metric.kind == "residual":
             value = value / loops.heave
         if metric.kind in ("peak", "least"):
-            rest = static.get(metric.output, np.zeros(1))
+            rest, loss = (side.get(metric.output, np.zeros(1)) for side in loops.holding)
             # The most probable maximum of a Gaussian signal (Rice 1945), as
             # `models.basics.metrics`.
             with np.errstate(all="ignore"):
@@ -122,7 +122,7 @@ def finished(
                     * np.sqrt(both[:, 0])
                     for both in loops.signed(metric.output)
                 ]
-            reach = np.max(each, axis=0) + loss.get(metric.output, np.zeros(1))
+            reach = np.max(each, axis=0) + loss
             value = rest - reach
             if metric.kind == "peak":
                 value = np.abs(rest) + reach
