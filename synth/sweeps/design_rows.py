@@ -10,7 +10,7 @@ disagree on begin again on finer nodes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from itertools import product
 
@@ -46,6 +46,7 @@ _REFERENCE = 3.0  # frequency by which polynomials are scaled [rad/s]
 _LEVELS = 6  # of nodes, each with panels half as long
 _PILOTS = 16  # rows that ask for panels
 _SHARE = 0.005  # of the accuracy, that a panel of theirs may take
+_SHORT_SHARE = 1e-4  # ... that one of fewer nodes may take: so little that no result moves
 _MOST_PANELS = 200
 _AT_ONCE = 2000  # rows of one pass where each has a density of its own, or finer nodes
 _EDGE = 1.0 + 1e-6  # drag over the least that is stable, up to which a loop counts as unstable
@@ -274,9 +275,11 @@ class DesignRows:
         """Return the common nodes of a level."""
         if level not in self._nodes:
             panels = self._panels
+            # Where all pilots are smooth, fewer nodes do; rows that are not begin again anyway.
+            short = () if level else {*panels}.difference(self._coarse(panels, short=True))
             for _ in range(level):
                 panels = halved(panels)
-            self._nodes[level] = self._nodes_on(panels)
+            self._nodes[level] = self._nodes_on(panels, short=short)
         return self._nodes[level]
 
     @cached_property
@@ -296,26 +299,29 @@ class DesignRows:
     def _panels(self) -> list[Panel]:
         """The panels that the pilots ask for."""
         axis, splits = self._frame
-        rows, loops = self._pilots, self._loops(self._pilots)
         panels = sweep_panels(axis, splits if self.sea.varies else [])
-        while len(panels) < _MOST_PANELS:
-            found = self._solved(rows, loops, self._nodes_on(panels, apart=True), alone=True)
-            error = np.zeros(len(panels))
-            for column in found.moments.values():
-                with np.errstate(all="ignore"):
-                    share = np.abs(column[:, :, 1:]) / column[:, :, :1]
-                error = np.maximum(error, np.nanmax(share, axis=(0, 1), initial=0.0))
-            coarse = error > _SHARE * self.accuracy
-            if not coarse.any():
-                break
-            kept = [p for p, c in zip(panels, coarse, strict=True) if not c]
-            panels = sorted(kept + halved([p for p, c in zip(panels, coarse, strict=True) if c]))
+        while len(panels) < _MOST_PANELS and (coarse := self._coarse(panels)):
+            panels = sorted(set(panels).difference(coarse).union(halved(coarse)))
         return panels
 
-    def _nodes_on(self, panels: Sequence[Panel], *, apart: bool = False) -> SweepNodes:
+    def _coarse(self, panels: Sequence[Panel], *, short: bool = False) -> list[Panel]:
+        """Return the panels on which the pilots' two rules disagree, the long pair or the short."""
+        nodes = self._nodes_on(panels, short=panels if short else (), apart=True)
+        found = self._solved(self._pilots, self._loops(self._pilots), nodes, alone=True)
+        error = np.zeros(len(panels))
+        for column in found.moments.values():
+            with np.errstate(all="ignore"):
+                share = np.abs(column[:, :, 1:]) / column[:, :, :1]
+            error = np.maximum(error, np.nanmax(share, axis=(0, 1), initial=0.0))
+        limit = (_SHORT_SHARE if short else _SHARE) * self.accuracy
+        return [p for p, e in zip(panels, error, strict=True) if e > limit]
+
+    def _nodes_on(
+        self, panels: Sequence[Panel], *, short: Collection[Panel] = (), apart: bool = False
+    ) -> SweepNodes:
         axis, splits = self._frame
         kinks = [] if self.sea.varies else splits
-        return sweep_nodes(axis, panels, self.sea.density, kinks=kinks, apart=apart)
+        return sweep_nodes(axis, panels, self.sea.density, kinks=kinks, short=short, apart=apart)
 
     @cached_property
     def _frame(self) -> tuple[FrequencyAxis, list[float]]:

@@ -5,18 +5,18 @@ So every panel gets a Gauss-Kronrod pair: the nodes of the longer rule hold thos
 one, and a second column of weights tells for each loop how far the two differ, at no further
 evaluation.  Loops for which that is too far (a resonance narrower than the panels) go on to the
 next level, of panels half as long.  The first panels are halved where some pilots of the sweep ask
-for it.
+for it, and those on which all of them are smooth make do with a pair of fewer nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
+from numpy.polynomial.legendre import leggauss, legvander
 from scipy.linalg import block_diag
 
 from models.basics import (
@@ -35,8 +35,8 @@ _PER_DECADE = 1.5
 _CLEARANCE = 0.6  # half of a panel over its distance from each pole of a loop, at most
 _FINE, _FINE_RULE = 0.1, 16  # pieces on which a density itself is integrated, and nodes of each
 
-# Kronrod's extension of the 7-point Gauss rule (Kronrod 1964; QUADPACK's qk15): nodes from the
-# outermost to the middle, their weights, and Gauss's weights of every other one.
+# Kronrod's extensions of the Gauss rules with 7 and with 5 points (Kronrod 1964; the longer is
+# QUADPACK's qk15): nodes from the outermost to the middle, and their weights.
 _NODES = (
     0.991455371120812639206854697526329, 0.949107912342758524526189684047851,
     0.864864423359769072789712788640926, 0.741531185599394439863864773280788,
@@ -49,9 +49,15 @@ _KRONROD = (
     0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
     0.204432940075298892414161999234649, 0.209482141084727828012999174891714,
 )  # fmt: skip
-_GAUSS = (
-    0.0, 0.129484966168869693270611432679082, 0.0, 0.279705391489276667901467771423780,
-    0.0, 0.381830050505118944950369775488975, 0.0, 0.417959183673469387755102040816327,
+_SHORT_NODES = (
+    0.984085360094842464496172934636139, 0.906179845938663992797626878299393,
+    0.754166726570849220440817166946116, 0.538469310105683091036314420700209,
+    0.279630413161783193413466522748977, 0.0,
+)  # fmt: skip
+_SHORT_KRONROD = (
+    0.042582036751081832864509450847670, 0.115233316622473394024626845880574,
+    0.186800796556492657467800026878486, 0.241040339228647586699942611223262,
+    0.272849801912558922340993264484456, 0.282987417857491213204255601371106,
 )  # fmt: skip
 
 
@@ -100,19 +106,21 @@ def sweep_nodes(
     density: Density,
     *,
     kinks: Sequence[float] = (),
+    short: Collection[Panel] = (),
     apart: bool = False,
 ) -> SweepNodes:
     """Return nodes on panels of an axis, for the density of the hook's motion, of omega [rad/s].
 
     Kinks of that density [rad/s] that lie within panels then stand in the weights (product
     integration: what is integrated with the density is the polynomial through the nodes), and
-    panels need to be no shorter than the responses ask for.  `apart` is whether the difference of
-    the two rules on each panel is wanted instead of the shorter rule, as many more rules.
+    panels need to be no shorter than the responses ask for.  Panels that are among `short` get the
+    pair with fewer nodes.  `apart` is whether the difference of the two rules on each panel is
+    wanted instead of the shorter rule, as many more rules.
     """
     cuts = axis.cut(np.array(kinks, dtype=np.complex128)).real.tolist()
     omega, weights, sea = [], [], []
     for a, b in panels:
-        x, *rules = _rule()
+        x, *rules = _rule((a, b) in short)
         (at,), (slope,) = axis.at((0.5 * (a + b) + 0.5 * (b - a) * x)[None])
         own = np.stack([0.5 * (b - a) * rule * slope for rule in rules])
         omega.append(at)
@@ -152,12 +160,11 @@ def _product(
     return found
 
 
-@lru_cache(maxsize=1)
-def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
+@lru_cache(maxsize=2)
+def _rule(short: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return nodes on [-1, 1], Kronrod's weights and Gauss's."""
-    x, kronrod, gauss = (np.array(part) for part in (_NODES, _KRONROD, _GAUSS))
-    return (
-        np.concatenate([-x, x[-2::-1]]),
-        np.concatenate([kronrod, kronrod[-2::-1]]),
-        np.concatenate([gauss, gauss[-2::-1]]),
-    )
+    half = (_SHORT_NODES, _SHORT_KRONROD) if short else (_NODES, _KRONROD)
+    x, kronrod = (np.array(part) for part in half)
+    gauss = np.zeros(2 * x.size - 1)
+    gauss[1::2] = leggauss(x.size - 1)[1]  # every other node is one of Gauss's
+    return np.concatenate([-x, x[-2::-1]]), np.concatenate([kronrod, kronrod[-2::-1]]), gauss
