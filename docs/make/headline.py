@@ -135,7 +135,8 @@ def products(gains: Mapping[str, float]) -> dict[str, float]:
 def redesign(key: Row, guesses: Sequence[Mapping[str, float]] = ()) -> sh.Design:
     """Return the design of one row; `guesses` as `optimise_gains` takes them."""
     structure = ROLLOFF if key["kind"] == "rolloff" else GAINS
-    return sh.optimise_gains(case_for(key), structure, guesses=guesses)
+    # Seed 0 ends in a poorer basin of the spring with 50 ms (144.5 mm); 1 to 4 find the one stored.
+    return sh.optimise_gains(case_for(key), structure, guesses=guesses, seed=1)
 
 
 def scaled(gains: Mapping[str, float], factor: float) -> dict[str, float]:
