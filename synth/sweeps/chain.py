@@ -31,7 +31,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -166,6 +166,7 @@ class Chain:
         self.E = -heard.get("rope.tension", zero) * self._load_cell() / self._own("falls")
         self.G, self.H = -self._payload(), self._hook()
         self._of_y, self._of_f = self.W + self.drive * self.D, self.pull + self.drive * self.E
+        self._white: Any = None
         self._rope()
 
     def _own(self, name: str) -> Any:
@@ -279,6 +280,11 @@ class Chain:
 
     def noise(self, shaken: Shaken) -> Any:
         """Return the density of the command that errors and noise of sensors, and losses, make."""
+        if self._white is None:
+            self._white = self._noise(shaken)
+        return self._white
+
+    def _noise(self, shaken: Shaken) -> Any:
         total: Any = np.zeros((1, 1))
         if shaken.switching is not None:
             # A torque over what a command makes of it; see `models.sensing.switching`.
@@ -389,6 +395,7 @@ class Chain:
         hung = (self._own("payload_mass") * self.s + drag[:, None]) * self.s
         numerators = self._of_heave(), self._of_noise()
 
+        @cache
         def shown(kind: int, name: str) -> Any:
             own, times = (PAYLOAD, hung) if name == LOWER_TENSION else (name, 1.0)
             return _sum_of(numerators[kind][own], y, f) * times
@@ -410,22 +417,41 @@ class Chain:
             found.append(np.stack(np.broadcast_arrays(*parts), axis=1))
         return found
 
-    def velocity_of_drag(self, nodes: SweepNodes, shaken: Shaken) -> list[FloatArray]:
-        """Return p0, p1, p2, w, (m, k): the velocity's variance is sum w/(p0 + C p1 + C^2 p2)."""
-        fixed, slope = self.closed_of_drag()
-        cross = 2.0 * (fixed.real * slope.real + fixed.imag * slope.imag)
+    def motion(self, nodes: SweepNodes, shaken: Shaken) -> Motion:
+        """Return what drag and friction of losses make of two velocities; without such friction.
+
+        `closed` is affine in each of C and b, and so are the numerators: no response is evaluated
+        anew for others.
+        """
+        (fixed, slope), turn = self.closed_of_drag(), self.s * (1.0 + self.s * self._own("lag"))
+        moved = self._per_drag * self._y[1], self._per_drag * self._f[1]
+        y, f = self.ends(np.zeros((1, 1)))
         heave: Any = nodes.sea[0]
         if shaken.ratios is not None:
             heave = part_of(shaken.ratios, self.rows) * nodes.weights[0]
         heave = heave * at_rows(shaken.factors, self.rows)
-        total = abs2(self._of_heave()[VELOCITY][2]) * heave
+        sources = [(heave, self._of_heave(), self.s * turn)]
         if shaken.noisy:
-            driven = abs2(self._of_noise()[VELOCITY][2])
-            total = total + driven * (self.noise(shaken) * nodes.weights[0])
+            white = self.noise(shaken) * nodes.weights[0]
             if self.coherent is not None:
-                total = total + driven * (self.coherent * heave)
-        shape = self.rows.size, len(nodes)
-        return [np.broadcast_to(p, shape) for p in (abs2(fixed), cross, abs2(slope), total)]
+                white = white + self.coherent * heave
+            sources.append((white, self._of_noise(), np.zeros((1, 1))))
+        count = self.rows.size
+        closed = np.empty((count, 4, 2, len(nodes)))
+        for j, part in enumerate((fixed, slope, turn * y, turn * moved[0])):
+            closed[:, j, 0], closed[:, j, 1] = part.real, part.imag
+        driven = np.zeros((count, 6, len(nodes)))
+        for density, numerators, per_friction in sources:
+            speed = numerators[SPEED]
+            pairs = (
+                (numerators[VELOCITY][2], per_friction),
+                (_sum_of(speed, y, f), _sum_of((*speed[:2], None), *moved)),
+            )
+            for j, (one, other) in enumerate(pairs):
+                cross = 2.0 * (one.real * other.real + one.imag * other.imag)
+                for k, part in enumerate((abs2(one), cross, abs2(other))):
+                    driven[:, 3 * j + k] += part * density
+        return Motion(closed.reshape(count, 4, -1), driven)
 
     def _of_heave(self) -> Mapping[str, Numerator]:
         """Return the numerators of outputs over `closed`, for the hook's heave."""
@@ -479,6 +505,30 @@ class Chain:
             "motor.voltage": voltage,
             "rope.tension": (None, self._own("reeved") * payload, None),
         }
+
+
+class Motion:
+    """Variances of the payload's velocity and the motor's speed of m loops, by drag and friction.
+
+    `closed`, (m, 4, 2 k), are the real and the imaginary parts of what stands at 1, C, b and b C
+    in the closed characteristic function; `driven`, (m, 6, k), the numerators' squares times
+    densities and weights, of the velocity at 1, b and b^2, then of the speed at 1, C and C^2.
+    """
+
+    def __init__(self, closed: FloatArray, driven: FloatArray) -> None:
+        self._closed, self._driven = closed, driven
+
+    def variances(self, held: FloatArray, rows: IndexArray | slice) -> FloatArray:
+        """Return both of some rows, (m, 2), with their C [N s/m] and b [N m s/rad], (m, 2)."""
+        closed, driven, (C, b) = self._closed[rows], self._driven[rows], held.T
+        size = (np.stack([np.ones_like(C), C, b, b * C], axis=1)[:, None] @ closed)[:, 0]
+        np.multiply(size, size, out=size)
+        half = driven.shape[2]
+        size = size[:, :half] + size[:, half:]
+        np.reciprocal(size, out=size)
+        sums = (driven @ size[:, :, None]).reshape(-1, 2, 3)
+        other = held[:, ::-1]
+        return np.asarray(sums[..., 0] + other * (sums[..., 1] + other * sums[..., 2]))
 
 
 def late(s: ComplexArray, delay: Any) -> Any:

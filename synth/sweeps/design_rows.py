@@ -10,7 +10,7 @@ disagree on begin again on finer nodes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from itertools import product
 
@@ -31,15 +31,13 @@ from models.spread import Spread
 
 from ..loop import switching_friction
 from ..question import DesignQuestion, SampledNoise
-from .chain import BLOCK, SPEED, VELOCITY, Chain, ChainLoops, Pair, Shaken
+from .chain import BLOCK, SPEED, VELOCITY, Chain, ChainLoops, Motion, Pair, Shaken
 from .kernel import SpringLoops
 from .law_rows import DesignLaw
 from .numbers import NOISE_OF, at_rest, numbers_of, part_of
 from .sea_rows import SeaRows
 from .sweep_nodes import Panel, SweepNodes, halved, sweep_nodes, sweep_panels
 from .winding_count import calming_drag, light_poles, survey
-
-Velocity = Callable[[IndexArray, FloatArray], FloatArray]
 
 ACCURACY = 1e-5  # difference of two rules from which a variance gets finer nodes
 _REFERENCE = 3.0  # frequency by which polynomials are scaled [rad/s]
@@ -51,10 +49,9 @@ _MOST_PANELS = 200
 _AT_ONCE = 2000  # rows of one pass where each has a density of its own, or finer nodes
 _EDGE = 1.0 + 1e-6  # drag over the least that is stable, up to which a loop counts as unstable
 _LAST = 1e-3  # difference of two rules that is told where no finer nodes are left
-_DRAG_ROUNDS = 60
-_LOSS_ROUNDS, _LOSS_AGREES = 30, 1e-12  # of the friction of losses beside the drag
-_AGREES = 3e-13  # of the logarithm of C
-_CLOSE = 1e-10  # ... and what will do
+_ROUNDS, _LATE = 40, 12  # of drag and friction that agree; from when on what is near will do
+_AGREES, _CLOSE = 1e-12, 1e-10  # of their logarithms
+_CLEAR = 0.4  # of the drag's above its edge, where the search begins
 _STEP = 1.5  # of it, at most
 
 
@@ -402,7 +399,9 @@ class DesignRows:
         if again.size:
             edge = np.zeros(at.size)
             edge[again] = calming_drag(loops.part(again))
+            again = again[edge[again] > 0.0]  # others have been looked for from zero
             self._settle(loops, again, nodes, shaken, edge, found, free)
+            again = again[np.isfinite(found.drag[again])]
             count[again], found.peak[again] = self._surveyed(loops, found, again)
         found.stable[:] = np.isfinite(found.drag) & (count == 0)
         return found
@@ -436,24 +435,17 @@ class DesignRows:
         for at in range(0, chosen.size, step):
             rows = chosen[at : at + step]
             chain = Chain(loops, rows, s)
-            for _ in range(_LOSS_ROUNDS if self._losses else 1):
-                if self._losses:
-                    chain = chain.with_friction(found.friction[rows])
-                if free[rows].any():
-                    velocity = _velocity_of(chain.velocity_of_drag(nodes, shaken), edge[rows])
-                    agreed = _agreeing_drag(quadratic[rows], self._start, velocity)
-                    # At the very edge the motion that calms a loop is of its own instability.
-                    agreed = np.where(agreed <= _EDGE * edge[rows], np.inf, agreed)
-                    found.drag[rows] = np.where(free[rows], agreed, found.drag[rows])
-                if not self._losses:
-                    break
-                drag = _sound(found.drag[rows])
-                speed = chain.moments([SPEED], nodes, shaken, drag)[SPEED][:, 0]
-                before, torque = found.friction[rows], found.holding[1]["motor.torque"]
-                known = switching_friction(part_of(torque, rows), speed)
-                found.friction[rows] = known
-                if np.all(np.abs(known - before) <= _LOSS_AGREES * known):
-                    break
+            if self._losses or free[rows].any():
+                known = np.stack([found.drag[rows], np.zeros(rows.size)], axis=1)
+                known[free[rows], 0] = np.where(quadratic[rows] > 0.0, np.nan, 0.0)[free[rows]]
+                torque = part_of(found.holding[1]["motor.torque"], rows)
+                known[:, 1] = np.where(torque > 0.0, np.nan, 0.0)
+                ask = _Asked(chain.motion(nodes, shaken), quadratic[rows], torque)
+                agreed = ask.agreed(known, self._start, edge[rows])
+                found.drag[rows], found.friction[rows] = agreed.T
+                if not np.isfinite(found.drag[rows]).any():
+                    continue  # none of them is stable
+                chain = chain.with_friction(found.friction[rows])
             if self._orders:
                 moments = chain.moments(self._orders, nodes, shaken, _sound(found.drag[rows]))
                 for name, column in moments.items():
@@ -470,62 +462,72 @@ def _sound(drag: FloatArray) -> FloatArray:
     return np.where(np.isfinite(drag), drag, 0.0)
 
 
-def _velocity_of(parts: Sequence[FloatArray], edge: FloatArray) -> Velocity:
-    """Return the rms velocity of loops by their drag, from `Chain.velocity_of_drag`."""
+class _Asked:
+    """What drag and friction the motion of m loops asks for: C = q sqrt(8/pi) sigma_v, and b.
 
-    def velocity(some: IndexArray, C: FloatArray) -> FloatArray:
-        every = some.size == edge.size
-        p0, p1, p2, driven = (p if every else p[some] for p in parts)
-        total = p2 * C[:, None]
-        total += p1
-        total *= C[:, None]
-        total += p0
-        np.divide(driven, total, out=total)
-        return np.where(edge[some] < C, np.sqrt(total.sum(axis=1)), np.inf)
-
-    return velocity
-
-
-def _agreeing_drag(quadratic: FloatArray, start: float, velocity: Velocity) -> FloatArray:
-    """Return the drag that agrees with each loop's response, (n,) [N s/m]; infinite for none.
-
-    C = q sqrt(8/pi) sigma_v(C), by the secant rule on logarithms.  More drag means less motion, so
-    that the right side falls; where a loop is unstable it is given more.  q is of the drag force q
-    |v| v of each, (n,) [N s2/m2]; `velocity` gives the rms of the payload's velocity of loops
-    `rows` with drag C, (m,), infinite if unstable.
+    q is of the drag force q |v| v of each, (m,) [N s2/m2]; `torque` is what the losses come to
+    either way, (m,) or (1,) [N m].
     """
-    slope = quadratic * np.sqrt(8.0 / np.pi)
-    x = np.full(quadratic.size, np.log(max(start, 1.0)))
-    found = np.where(quadratic > 0.0, np.inf, 0.0)
-    left, right = np.full_like(x, -np.inf), np.full_like(x, np.inf)
-    before, gap_before = np.full_like(x, np.nan), np.full_like(x, np.nan)
-    rows = np.flatnonzero(quadratic > 0.0)
-    for _ in range(_DRAG_ROUNDS):
-        if not rows.size:
-            break
-        sigma = velocity(rows, np.exp(x[rows]))
-        sound = np.isfinite(sigma)
-        with np.errstate(divide="ignore"):
-            gap = np.where(sound, np.log(np.maximum(slope[rows] * sigma, 1e-300)) - x[rows], _STEP)
-        done = np.abs(gap) < _AGREES
-        found[rows[done]] = np.exp(x[rows[done]])
-        # The gap falls with x: its sign says on which side the answer lies.
-        left[rows] = np.where(gap > 0.0, x[rows], left[rows])
-        right[rows] = np.where(gap > 0.0, right[rows], x[rows])
+
+    def __init__(self, motion: Motion, quadratic: FloatArray, torque: FloatArray) -> None:
+        self._motion, self._quadratic = motion, quadratic
+        self._torque = np.broadcast_to(torque, quadratic.shape)
+
+    def by(self, held: FloatArray, rows: IndexArray | slice = slice(None)) -> FloatArray:
+        """Return C and b that the motion of some loops with some C and b asks for, (m, 2)."""
+        variances = self._motion.variances(held, rows)
+        drag = self._quadratic[rows] * np.sqrt(8.0 / np.pi * variances[:, 0])
+        return np.stack([drag, switching_friction(self._torque[rows], variances[:, 1])], axis=1)
+
+    def agreed(self, known: FloatArray, start: float, edge: FloatArray) -> FloatArray:
+        """Return C and b that agree with the motion, (m, 2); C is infinite where none does.
+
+        What is known stays as it is; NaN is to be found, C from about `start` and above its edge.
+        """
+        free, least = np.isnan(known[:, 0]), _EDGE * edge
+        if edge.any():
+            # More drag means less motion: what asks for less at the edge does so above it.
+            held = known.copy()
+            held[free, 0] = np.where(np.isinf(edge), 0.0, least)[free]
+            held = self._together(held, held, edge)
+            # At the very edge the motion that calms a loop is of its own instability.
+            lost = free & ~(self.by(held)[:, 0] > least)
+            known = np.where(lost[:, None], held, known)
+        begin = known.copy()
+        begin[:, 0] = np.where(np.isnan(known[:, 0]), max(start, 1.0), known[:, 0])
+        found = self._together(known, begin, edge)
+        found[free & ~(found[:, 0] > least), 0] = np.inf
+        return found
+
+    def _together(self, known: FloatArray, begin: FloatArray, edge: FloatArray) -> FloatArray:
+        """Return C and b by secants on logarithms (Broyden 1965), (m, 2); C is NaN if none agree.
+
+        The search starts where the motion with `begin` leads.
+        """
+        free = np.isnan(known)
+        open_ = free.any(axis=1)
+        asked = self.by(np.nan_to_num(begin))
+        found = np.where(free, asked, known)
         with np.errstate(all="ignore"):
-            rise = (gap - gap_before[rows]) / (x[rows] - before[rows])
-        rise = np.where(np.isfinite(rise) & sound, np.clip(rise, -3.0, -0.3), -1.5)
-        before[rows], gap_before[rows] = x[rows], np.where(sound, gap, np.nan)
-        step = np.clip(-gap / rise, -_STEP, _STEP)
-        ahead = x[rows] + step
-        outside = (ahead <= left[rows]) | (ahead >= right[rows])
-        middle = 0.5 * (left[rows] + right[rows])
-        ahead = np.where(outside & np.isfinite(middle), middle, ahead)
-        x[rows] = ahead
-        narrow = right[rows] - left[rows] < _AGREES
-        found[rows[narrow & ~done]] = np.exp(right[rows[narrow & ~done]])
-        # Rounding may keep the last digits from agreeing.
-        close = np.abs(gap) < _CLOSE
-        found[rows[close & ~done]] = np.exp(before[rows[close & ~done]])
-        rows = rows[~(done | narrow)]
-    return found
+            x, least = np.where(free, np.log(asked), 0.0), np.log(edge)
+            x[:, 0] = np.where(free[:, 0], np.maximum(x[:, 0], least + _CLEAR), 0.0)
+            step, before = np.zeros_like(x), np.zeros_like(x)
+            inverse = np.tile(np.eye(2), (len(x), 1, 1))
+            for turn in range(_ROUNDS):
+                some = slice(None) if 2 * open_.sum() > open_.size else np.flatnonzero(open_)
+                asked[some] = self.by(np.where(free, np.exp(x), known)[some], some)
+                gap = np.where(free, np.log(asked) - x, 0.0)
+                found[open_] = np.where(free, asked, known)[open_]
+                # Rounding may keep the last digits from agreeing.
+                open_ &= ~(np.abs(gap).max(axis=1) < (_AGREES if turn < _LATE else _CLOSE))
+                if not open_.any():
+                    break
+                turned = np.einsum("mij,mj->mi", inverse, before - gap)
+                along = np.einsum("mi,mij->mj", step, inverse) / (step * turned).sum(1)[:, None]
+                update = (step - turned)[:, :, None] * along[:, None]
+                inverse += np.where(np.isfinite(update), update, 0.0)
+                ahead = x + np.clip(np.einsum("mij,mj->mi", inverse, gap), -_STEP, _STEP)
+                ahead[:, 0] = np.maximum(ahead[:, 0], 0.5 * (x[:, 0] + least))
+                step, before, x = ahead - x, gap, ahead
+        found[open_ & free[:, 0], 0] = np.nan
+        return found

@@ -12,6 +12,7 @@ from designs import structure_design
 from former_cases import load_case
 from solved_loops import solved_variance
 
+from models import load_case as shipped_case
 from models.basics import Quadrature, spectral_nodes
 from models.case import Case
 from models.hook import HookMotion
@@ -221,3 +222,46 @@ def test_extremes_of_a_sweep_are_those_with_the_worst_signs_of_the_units_errors(
             assert found[metric][k] == pytest.approx(wanted, rel=1e-5), (metric, row)
             if row.any():
                 assert abs(limits[name].measure(view) / wanted - 1.0) > 1e-4, (metric, row)
+
+
+def test_drag_and_friction_of_a_loop_that_hardly_decays_are_found_together() -> None:
+    # M_s is some hundreds: with any other friction a drag that agrees is elsewhere, or nowhere.
+    case = shipped_case("subsea-crane").replace(
+        {"rope.masses": 15, "rope.damping_law": "kelvin-voigt"}
+    )
+    parameters = {
+        "payload.acceleration_gain": 0.98162,
+        "payload.velocity_gain": 1.6166,
+        "payload.position_gain": 2.8879,
+        "drum.position_gain": 0.65588,
+        "heave.gain": 0.93224,
+        "rolloff.corner": 20.741,
+        "rolloff.damping": 1.0217,
+        "heave.lead": 0.028445,
+        "heave.bandwidth": 7.3838,
+    }
+    spread = Spread(
+        {
+            "payload.mass": "30 %",
+            "rope.axial_stiffness": "20 %",
+            "payload.drag_coefficient": "50 %",
+            "sensors.telemetry.delay": Uniform("20 ms", "60 ms"),
+        }
+    )
+    design = structure_design(case, "combined", parameters)
+    engine = FrequencyEngine(design, spread, metrics=["payload_rms", "drag", "max_sensitivity"])
+    rows = np.array(
+        [
+            [57259.44, 141536884.6, 2.135772422, 0.05900173526],
+            [60595.09202, 145897464.4, 1.617306486, 0.04611887449],
+        ]
+    )
+    found = engine.evaluate(rows)
+    for k, row in enumerate(rows):
+        view = alone(engine, row)
+        assert view is not None
+        assert found["stable"][k]
+        assert found["drag"][k] == pytest.approx(view.coefficients[0], rel=1e-8)
+        sigma = view.sigma("payload.displacement")
+        assert found["payload_rms"][k] == pytest.approx(sigma, rel=1e-7)
+        assert found["max_sensitivity"][k] == pytest.approx(view.max_sensitivity, rel=1e-6)
