@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         with_elements,
         without_losses,
     )
-    from .loop_model import LoopModel, lively_poles
+    from .loop_model import DECAY, LoopModel, abscissa, lively_poles
     from .margins import Margins, least_distances, level_ends, loop_margins, refine_minima
     from .pole_region import PoleRegion, counted_poles, with_delay_models
     from .responses import Closing, LoopBlocks, LoopResponses, Shaking

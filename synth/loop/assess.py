@@ -37,7 +37,7 @@ from .elements import (
     with_elements,
     without_losses,
 )
-from .loop_model import lively_poles
+from .loop_model import DECAY, abscissa, lively_poles
 from .margins import Margins, least_distances, loop_margins, refine_minima
 from .pole_region import PoleRegion, with_delay_models
 from .responses import Closing, LoopBlocks, LoopResponses, blocks_with, with_loops
@@ -52,7 +52,6 @@ _LOSS_ROUNDS, _LOSS_AGREES = 200, 1e-12  # of their coefficients on given nodes
 _SECANTS, _AGREED, _LONGEST = 25, 1e-12, 2.0  # steps, accuracy, longest step in logarithms
 _LEAST = -12.0  # logarithm of the share of its losses with which a stuck loop may move
 _GLANCED = 1e-8  # relative error of margins where nodes are made from poles
-_DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 _VERGE = 1e-5  # damping ratio below which only its own nodes see a pole
 
 Nodes = Callable[[ComplexArray], Quadrature]
@@ -170,19 +169,17 @@ class Assessment:
     @property
     def held(self) -> bool:
         """Whether the poles that a loop moves lie left of the axis by more than rounding."""
-        return all(self._abscissa(side) < -_DECAY for side in self._sides)
+        return all(self._abscissa(side) < -DECAY for side in self._sides)
 
     @property
     def swings(self) -> bool:
         """Whether it swings by itself in small motion, where quadratic drag vanishes."""
         dragged = any(element.lasting for element in self.elements)
-        return dragged and self._abscissa([0.0] * len(self.elements)) > _DECAY
+        return dragged and self._abscissa([0.0] * len(self.elements)) > DECAY
 
     def _abscissa(self, coefficients: Coefficients) -> float:
         """Return the largest real part of a lively pole over the size of the largest."""
-        poles = self._lively(coefficients)
-        size = max(1.0, float(np.abs(poles).max(initial=1.0)))
-        return float(poles.real.max(initial=-1.0)) / size
+        return abscissa(self._lively(coefficients))
 
     @cached_property
     def grid(self) -> FloatArray:

@@ -31,6 +31,7 @@ from .controller import LinearController, closed_loop_matrix
 from .elements import Element
 from .pole_region import with_delay_models
 
+DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 _DAMPED = 0.35  # damping ratio from which a mode may be left out
 _STILL = 1e-9  # size of a pole at zero, relative to the largest
 _PER_DECADE, _BEYOND = 3, 3.0  # frequencies of the Gramians, and how far beyond the poles
@@ -150,6 +151,12 @@ def lively_poles(
     found = np.linalg.eigvals(closed).astype(np.complex128)
     found.setflags(write=False)
     return found
+
+
+def abscissa(poles: ComplexArray) -> float:
+    """Return the largest real part over the size of the largest pole."""
+    size = max(1.0, float(np.abs(poles).max(initial=1.0)))
+    return float(poles.real.max(initial=-1.0)) / size
 
 
 def _factor(T: ComplexArray, Q: ComplexArray, B: FloatArray, omega: FloatArray) -> FloatArray:

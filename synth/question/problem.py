@@ -14,12 +14,14 @@ from models.plant import LinearPlant
 
 from ..limits import Limit
 from ..loop import (
+    DECAY,
     Assessment,
     Coefficients,
     Disturbance,
     Element,
     LinearController,
     LoopBlocks,
+    abscissa,
     lively_poles,
     with_delay_models,
     with_elements,
@@ -30,7 +32,6 @@ from ..structures import ParametrisedController
 Values = Sequence[float] | FloatArray
 
 _SLOW = 1e-4  # no real pole slower than this share of the plant's slowest one
-_DECAY = 1e-9  # a pole must lie this far left, relative to the size of the largest one
 
 
 class Goal(Enum):
@@ -147,36 +148,23 @@ class Problem:
 
     def abscissas(self, values: Values) -> Iterator[float]:
         """Yield `abscissa`, then that without drag if the loop swings by itself there."""
-        found = map(_abscissa, self.lively_poles(values, None, self.nothing))
+        found = map(abscissa, self.lively_poles(values, None, self.nothing))
         yield next(found)
-        if self.dragged and (calm := next(found)) > _DECAY:
+        if self.dragged and (calm := next(found)) > DECAY:
             yield calm
 
     def abscissa(self, values: Values, coefficients: Coefficients | None = None) -> float:
         """Return the largest real part of a lively pole over the size of the largest."""
-        return _abscissa(next(self.lively_poles(values, coefficients)))
-
-    def held(self, values: Values, coefficients: Coefficients | None = None) -> bool:
-        """Return whether the closed loop is stable with these coefficients, without losses too."""
-        found = self.lively_poles(values, *self._sides(coefficients))
-        return all(_abscissa(poles) < -_DECAY for poles in found)
-
-    def swings(self, values: Values) -> bool:
-        """Return whether the closed loop swings by itself in small motion.
-
-        Quadratic drag vanishes there: a loop that is unstable without it swings in any sea, and in
-        none, at the amplitude that gives it drag enough.
-        """
-        return self.dragged and self.abscissa(values, self.nothing) > _DECAY
+        return abscissa(next(self.lively_poles(values, coefficients)))
 
     def stable(self, values: Values, coefficients: Coefficients | None = None) -> bool:
         """Return whether the closed loop is stable, with these coefficients and in small motion."""
-        asked = dict.fromkeys(self._sides(coefficients), -_DECAY)
+        asked = dict.fromkeys(self._sides(coefficients), -DECAY)
         if self.dragged:
-            asked.setdefault(tuple(self.nothing), _DECAY)
+            asked.setdefault(tuple(self.nothing), DECAY)
         found = self.lively_poles(values, *asked)
         return all(
-            _abscissa(poles) < most for poles, most in zip(found, asked.values(), strict=True)
+            abscissa(poles) < most for poles, most in zip(found, asked.values(), strict=True)
         )
 
     def _sides(self, coefficients: Coefficients | None) -> list[tuple[float, ...] | None]:
@@ -209,9 +197,3 @@ def _opened(plant: LinearPlant, elements: tuple[Element, ...]) -> LinearPlant:
 def _controller(law: ParametrisedController, values: tuple[float, ...]) -> LinearController:
     """Return a controller, the same if asked again: a step asks for its poles more than once."""
     return law.controller(values)
-
-
-def _abscissa(poles: ComplexArray) -> float:
-    """Return the largest real part over the size of the largest pole."""
-    size = max(1.0, float(np.abs(poles).max(initial=1.0)))
-    return float(poles.real.max(initial=-1.0)) / size

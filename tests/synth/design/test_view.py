@@ -156,8 +156,9 @@ def test_a_loop_that_swings_by_itself_without_its_drag_is_seen_on_the_verge() ->
         assert not one.ok
         assert one.status.startswith("unstable in small motion, where drag vanishes: it swings by")
     problem, values = design.question.problem, design.question.values(gains)
-    assert problem.held(values, [design.drag])
-    assert problem.swings(values)
+    loop = problem.assess(values, [design.drag])
+    assert loop.held
+    assert loop.swings
     assert not problem.stable(values, [design.drag])
     assert not FamilyProblem.of(problem).stable(values, [[design.drag]])
     assert FamilyProblem.of(problem).abscissa(values) > 0.0
@@ -182,7 +183,7 @@ def test_a_loop_that_nothing_damps_does_not_swing_by_itself() -> None:
     assert posed.drag is not None
     still = [0.0] * len(posed.law.parameters)
     assert abs(posed.problem.loop_poles(still, posed.problem.nothing).real.max()) < 1e-8
-    assert not posed.problem.swings(still)
+    assert not posed.problem.assess(still, posed.problem.nothing).swings
 
 
 def test_the_curves_are_those_of_the_figures() -> None:
