@@ -144,15 +144,15 @@ def search(
     if not begins:
         return Found(solved=None)
     reference = briskest(family, begins)
-    places = _places(family, begins[:count], reference, len(kept), share * _ENOUGH, tell)
+    places = _places(family, begins[:count], reference, len(kept), share * _ENOUGH, roughly, tell)
     if roughly:
         return Found(solved=min(places, key=lambda p: (not p.arrived, p.coarse.objective)).coarse)
     if not kept_only and not any(place.arrived for place in places):
-        least = least_violation(family, begins, reference)
-        if not least.objective <= _BROKEN:
-            return _violated(family, least, _records(places), reference)
-        for begin in [least.values, *begins[count:]]:
-            if _come_by(family, places, begin, least.coefficients, reference).arrived:
+        nearest = least_violation(family, begins, reference)
+        if not nearest.objective <= _BROKEN:
+            return _violated(family, nearest, _records(places), reference)
+        for begin in [nearest.values, *begins[count:]]:
+            if _come_by(family, places, begin, nearest.coefficients, reference).arrived:
                 break
     if not only_guesses:
         _hopped(family, places, reference, starts, seed, tell)
@@ -206,12 +206,15 @@ def _places(
     reference: FloatArray,
     guesses: int,
     enough: int,
+    roughly: bool,
     tell: Progress,
 ) -> list[_Place]:
-    """Return where starts roughly lead, until enough of them agree."""
+    """Return where starts roughly lead, until enough of them agree, if `roughly` on the cost."""
     places: list[_Place] = []
     for k, begin in enumerate(begins):
         if k >= guesses + _LEAST and _agreed(places, enough):
+            break
+        if roughly and _as_good(places) >= enough:
             break
         tell("starts", k, len(begins))
         _come_by(family, places, begin, start_coefficients(family), reference)
@@ -346,6 +349,13 @@ def _agreed(places: Sequence[_Place], enough: int = _ENOUGH) -> bool:
     """Return whether so many starts come by one place that more of their kind would too."""
     arrived = [len(place.begins) for place in places if place.arrived]
     return max(arrived, default=0) >= max(enough, _MOST * sum(arrived))
+
+
+def _as_good(places: Sequence[_Place]) -> int:
+    """Return how many starts arrived somewhere as good as the best place."""
+    arrived = [place for place in places if place.arrived]
+    best = min((place.coarse.objective for place in arrived), default=np.inf)
+    return sum(len(p.begins) for p in arrived if p.coarse.objective < best + _AS_GOOD)
 
 
 def _same(family: FamilyProblem, one: Solution, other: Solution) -> bool:

@@ -79,6 +79,7 @@ def glanced(
     values: Values,
     coefficients: Coefficients | None = None,
     start: Coefficients | None = None,
+    how: str = "coarse",
 ) -> Assessment | None:
     """Return a loop on nodes that are made from its poles; None where no drag agrees with it.
 
@@ -89,7 +90,7 @@ def glanced(
     last: list[Quadrature] = []
 
     def nodes(poles: ComplexArray) -> Quadrature:
-        last.append(cost_nodes(problem, poles))
+        last.append(cost_nodes(problem, poles, how))
         return last[-1]
 
     if problem.elements and coefficients is None:

@@ -15,7 +15,7 @@ from models.basics import FloatArray
 from ..limits import Limit
 from ..loop import Assessment, Coefficients
 from ..question import FamilyProblem, Goal, Problem, Values
-from .nodes import cost_nodes, margin_nodes
+from .nodes import cost_nodes, glanced, margin_nodes
 from .programme import Programme, Solution
 from .sqp import INFEASIBLE
 
@@ -54,8 +54,7 @@ def stated(
         known = None if coefficients is None else coefficients[group[0]]
         own, shaken = scenario.values(values), family.shaken_by_all(group)
         poles = scenario.problem.loop_poles(own, known)
-        if fine and any(shaken.plant.delays) and any(d.band is None for d in shaken.disturbances):
-            # A delay ripples the spectrum of white noise far above all poles.
+        if fine and _rippled(shaken):
             found = shaken.assess(own, known).quadrature(shaken.outputs)
             # The plant's blocks may have a pole at zero, where the closed loop has none.
             least = _NEARLY_ZERO * float(found.omega[found.omega > 0.0].min())
@@ -210,16 +209,22 @@ def _measured(
     amplitude = float(np.exp(solved.extra)) if goal is Goal.SEA else 1.0
     assessments = []
     for scenario, coefficient in zip(family.scenarios, solved.coefficients, strict=True):
-        problem = scenario.problem
-        scaled = tuple(d.scaled(amplitude) for d in problem.disturbances)
+        scaled = tuple(d.scaled(amplitude) for d in scenario.problem.disturbances)
+        problem = replace(scenario.problem, disturbances=scaled)
         own = scenario.values(solved.values)
-        assessments.append(replace(problem, disturbances=scaled).assess(own, coefficient))
+        seen = None if _rippled(problem) else glanced(problem, own, coefficient, how="fine")
+        assessments.append(seen or problem.assess(own, coefficient))
     overs = {
         (i, limit.name): limit.use(limit.worst(assessments[i])) - 1.0
         for i, limit in own_limits(family)
         if limit.name not in relaxed
     }
     return tuple(assessments), overs
+
+
+def _rippled(problem: Problem) -> bool:
+    """Return whether a delay ripples the spectrum of white noise far above all poles."""
+    return any(problem.plant.delays) and any(d.band is None for d in problem.disturbances)
 
 
 def _off(family: FamilyProblem, solved: Solution, assessments: Sequence[Assessment]) -> float:

@@ -328,7 +328,8 @@ class Programme:
             objective = float(x[self._bound_at])
             values.append(logs - self._best - objective)
         equations = np.concatenate([np.zeros(0), *(balance for balance, _ in balances)])
-        return Glance(objective=objective, rows=np.concatenate(values), equations=equations)
+        every = np.concatenate(values)
+        return Glance(objective=objective, rows=every, equations=equations, costs=logs)
 
     @property
     def _sign(self) -> float:
@@ -380,6 +381,7 @@ class Programme:
         return Evaluation(
             curvature=curvature,
             objective=objective,
+            costs=np.array([c for c, _ in spread]),
             slope=slope,
             rows=np.concatenate(values),
             jacobian=np.concatenate(slopes),
@@ -410,7 +412,7 @@ class Programme:
             reached = np.isfinite(found.at.objective)
             costs = np.full(len(family.scenarios), np.inf)
             if reached:
-                costs = np.exp([c.item() for c in self._numbers(x, tighten)[0]])
+                costs = np.exp(found.at.costs)
         pressure = np.ones(len(family.scenarios))
         if self._bound_at is not None and reached:
             pressure = found.prices[-len(family.scenarios) :]

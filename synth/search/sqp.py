@@ -15,7 +15,7 @@ unstable are never evaluated: a spectral integral is finite there too.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import daqp
 import numpy as np
@@ -47,11 +47,15 @@ _SKIPPED = 1e-6  # an update along less than this share of a step is left out
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Glance:
-    """A programme at a point: objective, rows (m,) at most zero, equations (e,)."""
+    """A programme at a point: objective, rows (m,) at most zero, equations (e,).
+
+    `costs` (k,) are what the objective is made of, for who wants to know them at the end.
+    """
 
     objective: float
     rows: FloatArray
     equations: FloatArray
+    costs: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def broken(self) -> float:
