@@ -57,7 +57,7 @@ def given_design(case: Case, arguments: argparse.Namespace, *, search: bool = Tr
         design = load_design(arguments.design)
         if not design.parameters:
             raise InputError(f"{arguments.design}: has no controller: {design.status}")
-        return evaluate_gains(case, design.parameters, design.structure)
+        return evaluate_gains(case, design)
     if names_design(case, arguments):
         structure = arguments.structure or "payload-feedback"
         gains = case.gains if arguments.gains is None else parse_gains(arguments.gains, structure)
@@ -74,7 +74,7 @@ def given_design(case: Case, arguments: argparse.Namespace, *, search: bool = Tr
         design = best_design(case, arguments.structure, progress=step)
     if not design.parameters:
         raise SynthesisError(f"no design was found for {case.name}: {design.status}")
-    return evaluate_gains(case, design.parameters, design.structure)
+    return evaluate_gains(case, design)
 
 
 def with_design(

@@ -65,8 +65,8 @@ def show(item: Report | Table, out: Console) -> None:
     used = [k for k in range(len(item.columns)) if not k or any(t[k] for t in texts.values())]
     for k in used:
         column, heading = item.columns[k], item.headings[k]
-        # The last words give way where the line is full.
-        words = column.left and k == used[-1]
+        # Labels and the last words give way where the line is full, and never a figure.
+        words = k == 0 or (column.left and k == used[-1])
         grid.add_column(
             heading,
             justify="left" if column.left or k == 0 else "right",

@@ -287,7 +287,7 @@ def _high_order(posed: PosedFamily, order: int | None, progress: Progress | None
 
 
 @one_thread()
-def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback") -> Design:
+def evaluate_gains(case: Case, gains: object, structure: str | None = None) -> Design:
     """Return what given parameters do on a case, in the same form as an optimised design.
 
     It is ok if the limits are kept with the least damping that the rope may have, too.
@@ -298,18 +298,30 @@ def evaluate_gains(case: Case, gains: object, structure: str = "payload-feedback
         The case.
     gains
         The structure's parameters by name, for payload feedback ``A, a, a1, a2``; ``A`` may be
-        left out for the case's own (1 if it has none).  Or the section `gains` of a case.
+        left out for the case's own (1 if it has none).  Or the section `gains` of a case, or a
+        `Design`: it is looked at on no fewer rope masses than it was found on, so that on its own
+        case it is the same design again.
     structure
-        Name of the structure, see `synth.structures.structure_names`.
+        Name of the structure, see `synth.structures.structure_names`; by default that of a design,
+        else payload feedback.
 
     Raises
     ------
     InputError
-        If there is no such structure, or a parameter is missing, unknown or out of its range.
+        If there is no such structure, it is not that of the design, or a parameter is missing,
+        unknown or out of its range.
     """
-    posed = pose_family(case, (), structure)
+    least = 0
+    if isinstance(gains, Design):
+        if structure not in (None, gains.structure):
+            raise InputError(
+                f"structure: must be that of the design, {gains.structure}, got {structure}"
+            )
+        structure, least, gains = gains.structure, gains.masses, gains.parameters
+    posed = pose_family(case, (), structure or "payload-feedback")
     complete = checked_parameters(posed.first, gains)
-    looked = on_common_masses([partial(_looked_at, one, complete) for one in posed.questions])
+    looks = [partial(_looked_at, one, complete) for one in posed.questions]
+    looked = on_common_masses(looks, least)
     posed = replace(posed, questions=tuple(question for question, _, _ in looked))
     designs = [
         evaluated(question, complete, loop, growth=growth) for question, loop, growth in looked

@@ -301,15 +301,15 @@ def _growth(question: DesignQuestion, values: Values) -> float:
 
 def on_common_masses(
     looks: Sequence[Callable[[int], tuple[DesignQuestion, Assessment | None, float]]],
+    least: int = 0,
 ) -> list[tuple[DesignQuestion, Assessment | None, float]]:
     """Return the loops of a family on the masses that the most demanding of them asks for.
 
-    For each member, the case's own first, a look leads from the least number of masses to what
-    `on_enough_masses` returns.
+    For each member, the case's own first, a look leads from the least number of masses, at least
+    `least`, to what `on_enough_masses` returns.
     """
     found: dict[int, tuple[DesignQuestion, Assessment | None, float]] = {}
     asked = dict.fromkeys(range(len(looks)), -1)
-    least = 0
     while any(masses < least for masses in asked.values()) or not found:
         # The last have the least damping, and ask for most.
         for i in reversed(range(len(looks))):

@@ -283,7 +283,7 @@ def test_all_controllers_meet_in_one_table(run):
     controllers = summary()["controllers"]
     assert list(controllers) == [name for name in CONTROLLERS if name != "feedback-no-antiwindup"]
     assert "left out: feedback-no-antiwindup: static gains have no state" in table
-    assert "residual, drum held [%]" in table
+    assert re.search(r"residual, drum .*\n +held \[%\]", table)  # labels give way, figures do not
     assert all((Path("here") / name / "runs" / "seed-001.csv").exists() for name in controllers)
     row = next(line for line in table.splitlines() if "payload, rms" in line)
     unit = {"m": 1.0, "mm": 1e-3}[re.search(r"\[(m+)\]", row)[1]]

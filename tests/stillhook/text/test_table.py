@@ -64,6 +64,19 @@ def test_the_terminal_leaves_out_what_is_empty_and_shows_shares_as_bars():
     assert max(map(len, text.splitlines())) <= 80
 
 
+def test_a_narrow_terminal_breaks_labels_and_cuts_no_figure():
+    text = terminal_text(
+        Table(
+            columns=columns("limit; value [W]; bound [W]"),
+            rows=[("motor power, peak, with noise", 1.19994e6, 1.2e6)],
+        ),
+        width=32,
+    )
+    assert "1.20 MW" in text
+    assert "…" not in text
+    assert {"motor", "power,", "peak,", "noise"} <= set(text.split())
+
+
 def test_markdown_escapes_bars_and_shows_the_figures_that_were_drawn():
     text = markdown(REPORT)
     assert "| torque \\| peak | 12.3 mm | 50.0 % | kept |  |" in text

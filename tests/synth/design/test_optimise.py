@@ -61,6 +61,20 @@ def test_parameters_of_any_structure_are_evaluated() -> None:
     assert set(design.shares[PAYLOAD]) == {"hook.heave"}
 
 
+def test_a_design_is_looked_at_on_the_masses_it_was_found_on() -> None:
+    case = models.load_case("thesis-1975-rope").replace({"rope.damping_law": "hysteretic"})
+    gains = {"A": 1.0, "a": 3.0, "a1": 3.0, "a2": 3.0}
+    few = evaluate_gains(case, gains)
+    found = evaluate_gains(case.replace({"rope.masses": few.masses + 10}), gains)
+    again = evaluate_gains(case, found)
+    assert again.masses == found.masses > few.masses
+    assert again.structure == found.structure
+    assert again.payload_rms == pytest.approx(found.payload_rms, rel=1e-12)
+    assert again.margins.max_sensitivity == pytest.approx(found.margins.max_sensitivity, rel=1e-12)
+    with pytest.raises(InputError, match=r"structure: must be that of the design, payload-feedb"):
+        evaluate_gains(case, found, "feed-forward")
+
+
 @pytest.mark.parametrize(
     ("gains", "structure", "message"),
     [
