@@ -188,10 +188,7 @@ class RecordMotion:
     def motion(self, duration: float, step: float, seed: int) -> Motion:
         """Return the record's beginning; the seed plays no part.
 
-        Raises
-        ------
-        InputError
-            If the record is shorter than the duration: it is not repeated.
+        Raises InputError if the record is shorter than the duration: it is not repeated.
         """
         del seed
         last = self.displacement.size - 1

@@ -54,10 +54,8 @@ _ANGLES = (3, 4, 5)
 class VesselRaos(ReadOnlyArrays):
     """Response amplitude operators (RAOs) of a vessel's six motions.
 
-    Raises
-    ------
-    InputError
-        If a table is unsorted, out of range, NaN or of another shape than the two axes ask for.
+    Raises InputError if a table is unsorted, out of range, NaN or of another shape than the two
+    axes ask for.
 
     Examples
     --------
@@ -134,10 +132,7 @@ class VesselRaos(ReadOnlyArrays):
     def mode(self, name: str) -> ComplexArray:
         """Return one motion at the table's rows (k, h) [m/m or rad/m].
 
-        Raises
-        ------
-        InputError
-            If there is no such motion.
+        Raises InputError if there is no such motion.
         """
         if name not in MODES:
             raise InputError(f"{self.name}: a motion is one of {', '.join(MODES)}; got {name!r}")
@@ -205,10 +200,7 @@ class VesselRaos(ReadOnlyArrays):
         Small angles; complex, so that every motion keeps its phase.  The point of zero wave
         phase stays where it is.
 
-        Raises
-        ------
-        InputError
-            If the point is not three finite numbers.
+        Raises InputError if the point is not three finite numbers.
         """
         target = check_finite(self.name, "point", list(point))
         if target.shape != (3,):

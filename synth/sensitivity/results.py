@@ -81,10 +81,7 @@ class Sensitivity:
     def __getitem__(self, path: str) -> Elasticity:
         """Return the elasticity of a number by its path; at a corner the larger of the two.
 
-        Raises
-        ------
-        InputError
-            If there is none.
+        Raises InputError if there is none.
         """
         for entry in self.elasticities:
             if entry.path == path:
@@ -100,10 +97,7 @@ class Sensitivity:
 
         The thesis's Figure 32 has 0.1.
 
-        Raises
-        ------
-        InputError
-            If a path is unknown, or the number is at the end of its range.
+        Raises InputError if a path is unknown, or the number is at the end of its range.
         """
         wanted = [e.path for e in self.elasticities if e.path.startswith("gains.")]
         found = []
