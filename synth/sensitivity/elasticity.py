@@ -54,10 +54,6 @@ def sensitivity(
     progress
         Called with a word, the numbers done and their count.
 
-    Returns
-    -------
-    Sensitivity
-
     Raises
     ------
     InputError
