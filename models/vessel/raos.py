@@ -190,7 +190,11 @@ class VesselRaos(ReadOnlyArrays):
         table = _between_rows(self.omega, centred, rows, self.wave_number)
         headings, column = np.unique(np.mod(direction, 2.0 * math.pi), return_inverse=True)
         weights = self._heading_weights(owner, headings, smooth)
-        found = _between_headings(table, back, weights, column)
+        found = np.empty((frequency.size, len(MODES)), dtype=np.complex128)
+        for i, share in enumerate(weights):
+            points, used = np.flatnonzero(column == i), np.flatnonzero(share)
+            chosen = table[back[points][:, None], used]
+            found[points] = np.einsum("h,mhc->mc", share[used], chosen)
         found = found * self._wave_phase(frequency, direction)[:, None]
         return found.reshape(*shape, len(MODES))
 
@@ -350,26 +354,6 @@ def _between_rows(
             found[under, :, mode] = values[0, :, mode] * slope[:, None]
     if np.any(over):
         found[over] *= ((omega[-1] / wanted[over]) ** 2)[:, None, None]
-    return found
-
-
-def _between_headings(
-    table: ComplexArray,
-    row: npt.NDArray[np.intp],
-    weights: FloatArray,
-    column: npt.NDArray[np.intp],
-) -> ComplexArray:
-    """Return weighted sums (m, 6) of a table's headings, operators (n, h, 6), at points (m,).
-
-    `row` and `column` say which of the n frequencies, and which of the rows of `weights` (u, h),
-    each point has.
-    """
-    found = np.empty((row.size, len(MODES)), dtype=np.complex128)
-    for i, share in enumerate(weights):
-        points = np.flatnonzero(column == i)
-        used = np.flatnonzero(share)
-        chosen = table[row[points][:, None], used]
-        found[points] = np.einsum("h,mhc->mc", share[used], chosen)
     return found
 
 
