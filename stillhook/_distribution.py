@@ -16,10 +16,7 @@ SIBLINGS = ("models", "synth", "mpc")
 def check_siblings() -> None:
     """Check that the packages that Stillhook is made of stand beside `stillhook` itself.
 
-    Raises
-    ------
-    ImportError
-        If a name leads to another file, which the message names, or nowhere.
+    Raises ImportError if a name leads to another file, which the message names, or nowhere.
     """
     home = Path(__file__).resolve().parent.parent
     for name in SIBLINGS:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         GZIP,
         cache_folder,
         file_stamp,
+        keep_latest,
         read_bytes,
         read_text,
         reason,

@@ -109,6 +109,14 @@ def write_text_atomically(path: str | Path, text: str) -> Path:
     )
 
 
+def keep_latest(folder: Path, pattern: str, count: int) -> None:
+    """Remove the files of a folder that were longest unused, beyond so many."""
+    with contextlib.suppress(OSError):
+        found = sorted(folder.glob(pattern), key=lambda path: path.stat().st_mtime)
+        for path in found[:-count]:
+            path.unlink()
+
+
 def cache_folder() -> Path:
     """Return the folder of what is kept from one run to the next; it need not exist yet.
 

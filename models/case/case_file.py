@@ -30,11 +30,6 @@ def load_case(name_or_path: str | Path) -> Case:
     name_or_path
         A name that `bundled_cases` lists, or the path of a `.yaml`, `.json` or `.toml` file.
 
-    Returns
-    -------
-    Case
-        The case, checked.
-
     Raises
     ------
     InputError

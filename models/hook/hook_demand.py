@@ -41,10 +41,7 @@ class HookDemand:
     def from_case(cls, case: Case, *, probability: float = 0.9) -> HookDemand:
         """Return the figures of a case's hook, with its static tension and exposure time.
 
-        Raises
-        ------
-        InputError
-            If the probability does not lie between 0 and 1.
+        Raises InputError if the probability does not lie between 0 and 1.
         """
         fractile_factor(1.0, probability)  # tells if it is out of range
         return cls(

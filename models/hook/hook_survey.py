@@ -134,11 +134,6 @@ def hook_motion(
     fractile
         Probability of the second extreme value, beside the most probable one.
 
-    Returns
-    -------
-    HookSurvey
-        All figures, the case's own among them.
-
     Raises
     ------
     InputError

@@ -22,7 +22,6 @@ time, heave, roll and pitch, from which the motion of the crane's tip follows
 from __future__ import annotations
 
 import csv
-import math
 import re
 import warnings
 from collections.abc import Mapping, Sequence
@@ -39,6 +38,7 @@ from ..basics import (
     PhysicsWarning,
     check_choice,
     check_finite,
+    check_range,
     parse_quantity,
     read_only,
     read_text,
@@ -188,10 +188,7 @@ class RecordMotion:
     def motion(self, duration: float, step: float, seed: int) -> Motion:
         """Return the record's beginning; the seed plays no part.
 
-        Raises
-        ------
-        InputError
-            If the record is shorter than the duration: it is not repeated.
+        Raises InputError if the record is shorter than the duration: it is not repeated.
         """
         del seed
         last = self.displacement.size - 1
@@ -277,19 +274,9 @@ def read_columns(
     columns: dict[str, list[float]] = {name: [] for name in places}
     for (number, _), row in zip(rows[1:], cells, strict=True):
         for name, (i, factor) in places.items():
-            columns[name].append(factor * _number(f"{path}:{number}: {name}", row, i))
+            text = row[i].strip() if i < len(row) else ""
+            columns[name].append(factor * check_range(f"{path}:{number}", name, text))
     return {name: np.array(column) for name, column in columns.items()}
-
-
-def _number(where: str, row: Sequence[str], i: int) -> float:
-    text = row[i].strip() if i < len(row) else ""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where} must be a finite number, got {text!r}")
-    return value
 
 
 def _compare(source: str, name: str, measured: FloatArray, of_spline: FloatArray) -> None:

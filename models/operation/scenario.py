@@ -28,10 +28,7 @@ from .profile import Profile
 class Scenario:
     """An operation.
 
-    Raises
-    ------
-    InputError
-        If a time is out of order, or a motion is missing or not needed.
+    Raises InputError if a time is out of order, or a motion is missing or not needed.
     """
 
     name: str  #: What it is called.
@@ -168,10 +165,8 @@ class Scenario:
     def case_for(self, case: Case) -> Case:
         """Return the case as it is during the operation.
 
-        Raises
-        ------
-        InputError
-            If the case cannot be that, such as a drive that cannot hold the load in air.
+        Raises InputError if the case cannot be that, such as a drive that cannot hold the load in
+        air.
         """
         if not self.case_changes:
             return case

@@ -36,7 +36,6 @@ from ..basics import (
     signal_names,
     signal_rates,
 )
-from .discrete import zero_order_hold
 from .pade import pade_bank
 from .resolvent import Resolvent, Transfer
 from .response import PlantResponse
@@ -469,15 +468,6 @@ class LinearPlant(ReadOnlyArrays):
             Cz=np.hstack([self.Cz, np.zeros((len(self.Cz), len(A2)))]),
             states=(*self.states, *names),
         )
-
-    def discretise(self, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return A, B and E of the plant sampled every `dt` [s], inputs and disturbances held.
-
-        Raises InputError if `dt` is not above zero.
-        """
-        check_range(_OWNER, "dt", dt, low=0.0, unit="s", open_low=True)
-        Ad, BEd = zero_order_hold(self.A, np.hstack([self.B, self.E]), dt)
-        return Ad, BEd[:, : len(self.inputs)], BEd[:, len(self.inputs) :]
 
     def to_control(self, pade_order: int = 6) -> control.StateSpace:
         """Return a python-control system, inputs then disturbances to measurements then outputs.

@@ -21,10 +21,8 @@ from ..basics import FloatArray, InputError, check_finite, check_range
 class Scatter:
     """Sea states and how often each occurs.
 
-    Raises
-    ------
-    InputError
-        If the columns have unequal lengths, a value is out of range, or nothing occurs.
+    Raises InputError if the columns have unequal lengths, a value is out of range, or nothing
+    occurs.
 
     Examples
     --------

@@ -57,10 +57,8 @@ def read_scatter(path: str | Path, *, gamma: float = 1.0) -> Scatter:
     JONSWAP spectrum of `gamma` [-]; 1 is Pierson-Moskowitz's, which published diagrams of T_z
     assume.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is missing, a figure is no number or out of range.
+    Raises InputError if the file cannot be read, a column is missing, a figure is no number or out
+    of range.
     """
     ratio = zero_crossing_ratio(gamma)
     owner = str(path)

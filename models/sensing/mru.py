@@ -208,7 +208,7 @@ class MruModel:
         `read` gives heave [m] and heave rate [m/s] at so many samples from one on; what lies before
         the run or after it is not known, and 0.
         """
-        gain, phase = (sign * e for sign, e in zip(self.signs, self._stated, strict=True))
+        gain, phase = self.signs[0] * self._unit.gain_error, self.signs[1] * self._unit.phase_error
         if phase == 0.0:
             z, v = read(start, count)
             return ((1.0 + gain) * z, (1.0 + gain) * v) if gain else (z, v)
@@ -343,10 +343,6 @@ class MruModel:
         factor, gains = self._filter_step
         drive = path[:-1] @ gains[:2] + path[1:] @ gains[2:]
         return mode_recursion(factor, mode, drive)
-
-    @property
-    def _stated(self) -> tuple[float, float]:
-        return self._unit.gain_error, self._unit.phase_error
 
     @cached_property
     def _quarter(self) -> FloatArray:

@@ -23,7 +23,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..basics import SolverError, cache_folder
+from ..basics import SolverError, cache_folder, keep_latest
 
 # No fast-math and no fused multiply-add: the compiled recursion must give the same numbers as
 # CasADi's virtual machine.  Hidden symbols cannot clash with those of another library.
@@ -102,7 +102,7 @@ def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:
                 built = _build(source, compiler, flags, Path(scratch))
                 library = folder / _name(key, built.read_bytes())
                 os.replace(built, library)
-            _tidy(folder)
+            keep_latest(folder, f"*{_suffix()}", KEPT)
             return ctypes.CDLL(str(library))
         # A folder that may not be written, or not be run from; a user without a home.
         except (OSError, RuntimeError) as error:
@@ -160,14 +160,6 @@ def _run(
         timeout=limit,
         check=False,
     )
-
-
-def _tidy(folder: Path) -> None:
-    """Remove the libraries that were longest unused, beyond `KEPT`."""
-    with contextlib.suppress(OSError):
-        kept = sorted(folder.glob(f"*{_suffix()}"), key=lambda path: path.stat().st_mtime)
-        for path in kept[:-KEPT]:
-            path.unlink()
 
 
 @functools.lru_cache(maxsize=1)

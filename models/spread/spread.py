@@ -42,10 +42,8 @@ Pairs = Mapping[tuple[str, str], float]
 class Spread:
     """What varies about a case.
 
-    Raises
-    ------
-    InputError
-        If nothing varies, a path is given twice, or correlations contradict each other.
+    Raises InputError if nothing varies, a path is given twice, or correlations contradict each
+    other.
 
     Examples
     --------
@@ -107,10 +105,7 @@ class Spread:
 
         Messages name the file's `source` and `lines`.
 
-        Raises
-        ------
-        InputError
-            If it is not one; the message names the path.
+        Raises InputError if it is not one; the message names the path.
         """
 
         def refused(path: Place, text: object) -> InputError:
@@ -142,10 +137,7 @@ class Spread:
     def from_yaml(cls, path: str | Path) -> Spread:
         """Read a spread file, see docs/sweeps.md.
 
-        Raises
-        ------
-        InputError
-            If there is no such file or it is no spread; file and line are named.
+        Raises InputError if there is no such file or it is no spread; file and line are named.
         """
         data, lines = read_yaml(read_text(path), str(path))
         return cls.from_dict(data, source=str(path), lines=lines)
@@ -248,10 +240,7 @@ class Spread:
     def count(self, samples: int | None, method: str = "sobol") -> int:
         """Return how many rows `sample` gives.
 
-        Raises
-        ------
-        InputError
-            If the method is unknown, or `samples` is wanted and missing.
+        Raises InputError if the method is unknown, or `samples` is wanted and missing.
         """
         if method == "given":
             given = {len(d.values) for d in self._lists()}
@@ -292,10 +281,7 @@ class Spread:
     def case_at(self, row: npt.ArrayLike) -> Case:
         """Return the case of a row, without words about implausible physics.
 
-        Raises
-        ------
-        InputError
-            If the spread has met no case, or the values are not valid together.
+        Raises InputError if the spread has met no case, or the values are not valid together.
         """
         if self.case is None:
             raise InputError("spread: it has met no case; call Spread.on(case) first")

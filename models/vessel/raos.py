@@ -54,10 +54,8 @@ _ANGLES = (3, 4, 5)
 class VesselRaos(ReadOnlyArrays):
     """Response amplitude operators (RAOs) of a vessel's six motions.
 
-    Raises
-    ------
-    InputError
-        If a table is unsorted, out of range, NaN or of another shape than the two axes ask for.
+    Raises InputError if a table is unsorted, out of range, NaN or of another shape than the two
+    axes ask for.
 
     Examples
     --------
@@ -134,10 +132,7 @@ class VesselRaos(ReadOnlyArrays):
     def mode(self, name: str) -> ComplexArray:
         """Return one motion at the table's rows (k, h) [m/m or rad/m].
 
-        Raises
-        ------
-        InputError
-            If there is no such motion.
+        Raises InputError if there is no such motion.
         """
         if name not in MODES:
             raise InputError(f"{self.name}: a motion is one of {', '.join(MODES)}; got {name!r}")
@@ -195,7 +190,11 @@ class VesselRaos(ReadOnlyArrays):
         table = _between_rows(self.omega, centred, rows, self.wave_number)
         headings, column = np.unique(np.mod(direction, 2.0 * math.pi), return_inverse=True)
         weights = self._heading_weights(owner, headings, smooth)
-        found = _between_headings(table, back, weights, column)
+        found = np.empty((frequency.size, len(MODES)), dtype=np.complex128)
+        for i, share in enumerate(weights):
+            points, used = np.flatnonzero(column == i), np.flatnonzero(share)
+            chosen = table[back[points][:, None], used]
+            found[points] = np.einsum("h,mhc->mc", share[used], chosen)
         found = found * self._wave_phase(frequency, direction)[:, None]
         return found.reshape(*shape, len(MODES))
 
@@ -205,10 +204,7 @@ class VesselRaos(ReadOnlyArrays):
         Small angles; complex, so that every motion keeps its phase.  The point of zero wave
         phase stays where it is.
 
-        Raises
-        ------
-        InputError
-            If the point is not three finite numbers.
+        Raises InputError if the point is not three finite numbers.
         """
         target = check_finite(self.name, "point", list(point))
         if target.shape != (3,):
@@ -358,26 +354,6 @@ def _between_rows(
             found[under, :, mode] = values[0, :, mode] * slope[:, None]
     if np.any(over):
         found[over] *= ((omega[-1] / wanted[over]) ** 2)[:, None, None]
-    return found
-
-
-def _between_headings(
-    table: ComplexArray,
-    row: npt.NDArray[np.intp],
-    weights: FloatArray,
-    column: npt.NDArray[np.intp],
-) -> ComplexArray:
-    """Return weighted sums (m, 6) of a table's headings, operators (n, h, 6), at points (m,).
-
-    `row` and `column` say which of the n frequencies, and which of the rows of `weights` (u, h),
-    each point has.
-    """
-    found = np.empty((row.size, len(MODES)), dtype=np.complex128)
-    for i, share in enumerate(weights):
-        points = np.flatnonzero(column == i)
-        used = np.flatnonzero(share)
-        chosen = table[row[points][:, None], used]
-        found[points] = np.einsum("h,mhc->mc", share[used], chosen)
     return found
 
 

@@ -36,10 +36,7 @@ Place = tuple[str | int, ...]
 def save_design(design: Design, path: str | Path) -> Path:
     """Write a design to a YAML file in a folder that exists, whole or not at all; return its path.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written.
+    Raises InputError if it cannot be written.
     """
     return write_text_atomically(path, design_text(design))
 
@@ -93,10 +90,8 @@ def load_design(path: str | Path) -> Design:
 
     It is equal to the one saved, to the last digit; `verify` checks it anew.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it is not a design, or a field is missing, unknown or wrong.
+    Raises InputError if there is no such file, it is not a design, or a field is missing, unknown
+    or wrong.
     """
     source = str(path)
     data, lines = read_yaml(_text(Path(path)), source)

@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics import InputError, cache_folder
+from models.basics import InputError, cache_folder, keep_latest
 from models.case import Case
 from synth.design import Design
 
@@ -58,7 +58,7 @@ def keep_best(found: Design, case: Case, structure: str | None) -> None:
     with contextlib.suppress(OSError, InputError):
         place.parent.mkdir(parents=True, exist_ok=True)
         save_design(found, place)
-        _tidy(place.parent)
+        keep_latest(place.parent, "*.yaml", KEPT)
 
 
 def _place(case: Case, structure: str | None) -> Path:
@@ -69,11 +69,3 @@ def _place(case: Case, structure: str | None) -> Path:
     }
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:40]
     return cache_folder() / "designs" / f"{digest}.yaml"
-
-
-def _tidy(folder: Path) -> None:
-    """Remove the designs longest unused."""
-    kept = sorted(folder.glob("*.yaml"), key=lambda p: p.stat().st_mtime, reverse=True)
-    for path in kept[KEPT:]:
-        with contextlib.suppress(OSError):
-            path.unlink()

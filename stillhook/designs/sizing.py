@@ -96,7 +96,10 @@ def worth_figure(result: Worth) -> Figure:
         place: Any = {"xytext": (4.0 if inside else -4.0, 0.0), "textcoords": "offset points"}
         words: Any = {"ha": side, "va": "center", "color": colour, "fontsize": 9.0}
         axes.annotate(quantity(row.twice_rms, "m"), (after, k), **place, **words)
-    labels = [f"{typeset(row.item.name)}  {_change(row)}" for row in rows]
+    labels = []
+    for row in rows:
+        now, then = (_value_text(row.item.value * by, row.item.unit) for by in (1.0, row.factor))
+        labels.append(f"{typeset(row.item.name)}  {now} to {then}")
     axes.set_yticks(range(len(rows)), labels)
     axes.invert_yaxis()
     axes.axvline(top, color=REFERENCE, linewidth=1.0)
@@ -226,13 +229,6 @@ def step_text(row: WorthRow) -> str:
         return "-"
     step = _value_text(item.step, item.unit)
     return f"{quantity(row.per_step, 'm')} per {step}"
-
-
-def _change(row: WorthRow) -> str:
-    item = row.item
-    return (
-        f"{_value_text(item.value, item.unit)} to {_value_text(item.value * row.factor, item.unit)}"
-    )
 
 
 def _limit(binding: tuple[str, ...]) -> str:

@@ -214,11 +214,8 @@ def resume_sweep(
 
     The store is the folder that `sweep` was given; another engine gives the same numbers.
 
-    Raises
-    ------
-    InputError
-        If there is no sweep, it is spoilt, was computed by other code, or its controller was
-        Python code (then call `sweep` again as before).
+    Raises InputError if there is no sweep, it is spoilt, was computed by other code, or its
+    controller was Python code (then call `sweep` again as before).
     """
     from . import accessor
     from .store import stored_question

@@ -72,10 +72,7 @@ minute; a drive with half of its torque or a third of its power for a minute."""
 def fault_spread(*names: str) -> Spread:
     """Return the spread of one or several kinds of faults, by names of `FAULT_SPREADS`.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown.
+    Raises InputError if a name is unknown.
 
     Examples
     --------

@@ -128,10 +128,6 @@ def lqg_bound(
     begin
         Multipliers to begin with, as those of a bound with other sensors.
 
-    Returns
-    -------
-    Bound
-
     Raises
     ------
     InputError

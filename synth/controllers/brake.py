@@ -17,10 +17,7 @@ class BrakeOn(RecursiveController):
     carries nothing and stays cold.  A sample lasts T [s].  Nothing of the case is needed, but every
     controller is made from one.
 
-    Raises
-    ------
-    InputError
-        If the sample time is out of its range.
+    Raises InputError if the sample time is out of its range.
     """
 
     def __init__(self, case: Case, *, sample_time: float = 0.02) -> None:

@@ -19,7 +19,7 @@ it is asked, the states follow what it does,
 
     x+ = A x + B e + K_b (u_applied - u_asked),
 
-with K_b by `synth.structures.sampled_controller.tracking_gain`, so that A - K_b C is stable, an
+with K_b by `synth.structures.sampling.tracking_gain`, so that A - K_b C is stable, an
 integrator included.
 
 What comes up from the payload may stop coming.  Values older than `hold_for` fade out, until

@@ -189,10 +189,7 @@ class Design:
     def controller(self) -> LinearController:
         """The controller in state space, u = +C y, as `LinearFeedback` takes it.
 
-        Raises
-        ------
-        InputError
-            If no controller was found.
+        Raises InputError if no controller was found.
         """
         return controller_for(self.built_for or self.case, self.structure, self._known)
 
@@ -211,10 +208,7 @@ class Design:
     def assessment(self) -> Assessment:
         """The closed loop in numbers: spectra, responses, margins, poles.
 
-        Raises
-        ------
-        InputError
-            If no controller was found.
+        Raises InputError if no controller was found.
         """
         known = self.question.coefficients_of(self.drag, self.friction)
         return self.question.assess(self._known, known)

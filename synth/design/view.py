@@ -130,10 +130,7 @@ class View:
 
         Sea, plant and the drum held are kept where the changes leave them as they are.
 
-        Raises
-        ------
-        InputError
-            If a change is not valid.
+        Raises InputError if a change is not valid.
         """
         given = self.posed.questions[: self.posed.given]
         first, *others = (question.case.replace(dict(changes)) for question in given)
@@ -150,11 +147,8 @@ class View:
         gains that the case has in use; if `verify`, the design is checked as one by
         `optimise_gains` is.
 
-        Raises
-        ------
-        InputError
-            If a parameter is missing, unknown or out of its range, the start is unstable, or no
-            gains of its own keep the limits of a member, for the regret.
+        Raises InputError if a parameter is missing, unknown or out of its range, the start is
+        unstable, or no gains of its own keep the limits of a member, for the regret.
         """
         given = self.case.gains if start is None else start
         parameters = checked_parameters(self.posed.first, given)

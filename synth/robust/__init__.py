@@ -12,8 +12,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .family import DiscreteValues, Family, SeaState, sea_states
     from .perturbation import GainRadius, gain_radius
-    from .robust import optimise_robust
-    from .robust_result import RobustDesign, ScenarioResult
+    from .robust import RobustDesign, ScenarioResult, optimise_robust
     from .schedule import GainSchedule, schedule_gains
     from .worst_parameters import Robustness, robustness
 else:

@@ -152,10 +152,7 @@ class Family:
     def corners(self) -> list[Member]:
         """Return the ends of all ranges and all choices, in every sea state.
 
-        Raises
-        ------
-        InputError
-            If there are more than 4096.
+        Raises InputError if there are more than 4096.
         """
         ends = [(a.low, a.high) if a.continuous else a.values for a in self.axes]
         return list(self._product(ends))
@@ -197,10 +194,7 @@ class Family:
     def case_at(self, member: Member) -> Case:
         """Return the case of a member.
 
-        Raises
-        ------
-        InputError
-            If the values are not valid together.
+        Raises InputError if the values are not valid together.
         """
         sea = self.seas[member.sea].changes(self.case)
         return self.case.replace({**self.changes(member), **sea})

@@ -64,9 +64,7 @@ class DrawCheck:
     kept: int
     #: 95 % confidence interval of the share that is stable (Clopper and Pearson 1934).
     interval: tuple[float, float]
-    #: The draws with the largest payload motion, and with the largest use of a limit.
-    worst_rms: Figures
-    worst_use: Figures
+    worst_rms: Figures  #: The draw with the largest payload motion.
     #: Payload rms [m] that 50, 90, 99 and 100 % of the stable draws stay below.
     quantiles: Mapping[float, float]
     #: Of the stable draws [m], [-].
@@ -255,7 +253,6 @@ def draw_check(
         kept=kept,
         interval=(certain.low, certain.high),
         worst_rms=max(unstable or stable, key=lambda f: f.payload_rms),
-        worst_use=max(unstable or stable, key=lambda f: f.use),
         quantiles={q: float(np.quantile(rms, q)) if rms.size else np.inf for q in _QUANTILES},
         payload_rms=read_only(rms),
         max_sensitivity=read_only(np.array([f.max_sensitivity for f in stable])),

@@ -155,10 +155,6 @@ def robustness(
     progress
         Called as progress(stage, done, total).
 
-    Returns
-    -------
-    Robustness
-
     Raises
     ------
     InputError

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .elasticity import sensitivity
+    from .elasticity import Elasticity, Moved, Sensitivity, sensitivity
     from .global_indices import SobolIndices, sobol_indices
-    from .results import Elasticity, Moved, Sensitivity
     from .screening import Screening, morris_screening
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -12,8 +12,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .codesign import CoDesign, co_design
     from .follow import Answer
-    from .pareto import ParetoFront, pareto_front
-    from .pareto_walk import best_of_each
+    from .pareto import ParetoFront, best_of_each, pareto_front
     from .purchase import Worth, WorthRow, worth
     from .sizing import Sizing, size_winch
 else:

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw
     from .lqg import LqgEstimator, LqgRegulator, estimator, reduced, regulator, shaped, weighing
     from .recursive import RecursiveController, Signals, checked_sample_time, make_recursion
-    from .sampled_controller import Matrices, sampled, tracking_gain
-    from .sampling import SampledLoop, sampled_loop
+    from .sampling import Matrices, SampledLoop, sampled, sampled_loop, tracking_gain
     from .structure import (
         Parameter,
         ParametrisedController,

@@ -42,6 +42,7 @@ from ...basics import (
     cache_folder,
     check_ascending,
     check_range,
+    keep_latest,
     replace_atomically,
     wave_frequency,
     wave_number,
@@ -352,7 +353,7 @@ def cached_hydrodynamics(
         with contextlib.suppress(OSError, InputError):
             folder.mkdir(parents=True, exist_ok=True)
             replace_atomically(place, lambda path: _write(path, solved))
-            _tidy(folder)
+            keep_latest(folder, "*.npz", KEPT)
     return solved, False
 
 
@@ -382,11 +383,3 @@ def _read(place: Path) -> Hydrodynamics | None:
             )
     except (OSError, ValueError, LookupError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
-
-
-def _tidy(folder: Path) -> None:
-    """Remove the computations longest unused."""
-    kept = sorted(folder.glob("*.npz"), key=lambda p: p.stat().st_mtime, reverse=True)
-    for path in kept[KEPT:]:
-        with contextlib.suppress(OSError):
-            path.unlink()

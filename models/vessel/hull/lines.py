@@ -38,11 +38,8 @@ _ENTRANCE = (0.04, 1.0 / (1.0 + _RUN))  # over the ship's length, shortest and l
 class ShipLines:
     """Main dimensions of a simple ship.
 
-    Raises
-    ------
-    InputError
-        If a dimension is out of range.  A block coefficient that these lines cannot have is told
-        by :meth:`hull`.
+    Raises InputError if a dimension is out of range.  A block coefficient that these lines cannot
+    have is told by :meth:`hull`.
 
     Examples
     --------
@@ -77,10 +74,7 @@ class ShipLines:
     def hull(self, *, panels: int = 400, name: str | None = None) -> Hull:
         """Return the wetted surface in some `panels`, called after its dimensions by default.
 
-        Raises
-        ------
-        InputError
-            If no entrance and run give the block coefficient.
+        Raises InputError if no entrance and run give the block coefficient.
         """
         check_range("ship", "panels", panels, low=40, high=20_000)
         wanted = self.block * self.length * self.beam * self.draught

@@ -104,11 +104,6 @@ def vessel_from_hull(
     threads, cache, progress
         As for :func:`models.vessel.hull.bem.cached_hydrodynamics`.
 
-    Returns
-    -------
-    HullVessel
-        Hydrostatics, coefficients and motions.
-
     Raises
     ------
     InputError

@@ -175,10 +175,7 @@ def read_raos(
 def write_raos(path: str | Path, raos: VesselRaos) -> Path:
     """Write a table as the project's CSV (.csv) or NetCDF (.nc); both read back exactly.
 
-    Raises
-    ------
-    InputError
-        If the name ends otherwise, or the file cannot be written.
+    Raises InputError if the name ends otherwise, or the file cannot be written.
     """
     place = Path(path)
     if place.suffix.lower() == ".csv":

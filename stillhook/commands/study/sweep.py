@@ -131,7 +131,9 @@ def _swept(arguments: argparse.Namespace) -> Swept:
     if arguments.case is None:
         raise InputError("sweep: say which case, or --resume and the folder of a sweep")
     if arguments.mode == "frequency":
-        _only_in_time(arguments)
+        wrong = [word for word in changed_words(arguments, ARGUMENTS) if word in _IN_TIME]
+        if wrong:  # it would do nothing
+            raise InputError(f"sweep: {', '.join(wrong)}: only with --mode time")
     case = given_case(arguments)
     design = given_pilot(case, arguments)
     spread = given_spread(arguments)
@@ -265,16 +267,6 @@ def _number(text: str) -> float | str:
         return text.strip()
 
 
-def _only_in_time(arguments: argparse.Namespace) -> None:
-    """Refuse options that would do nothing.
-
-    Raises InputError if there is one.
-    """
-    wrong = [word for word in changed_words(arguments, ARGUMENTS) if word in _IN_TIME]
-    if wrong:
-        raise InputError(f"sweep: {', '.join(wrong)}: only with --mode time")
-
-
 def _concluded(swept: Swept, arguments: argparse.Namespace) -> int:
     """Write and print what the sweep says; return the exit status."""
     result, most = swept.result, arguments.worst
@@ -336,7 +328,8 @@ def _next(
             at = place_of(swept.result, worst[0])
             seed = int(swept.result["seed"].to_numpy()[at])
             words = ["stillhook simulate", file, *_controller_words(swept, law)]
-            words.append(f"--first-seed {seed} --duration '{_duration(swept.result):g} s'")
+            lasting = float(json.loads(swept.result.attrs[ATTRIBUTE])["duration"])
+            words.append(f"--first-seed {seed} --duration '{lasting:g} s'")
             found.append(("see the worst case again", " ".join(words)))
     if swept.words and swept.result.attrs.get("mode") != "time":
         same = " ".join([swept.words, *design_words(arguments)])
@@ -347,11 +340,6 @@ def _next(
             command += f" {again}"
         found.append(("the same in time, with limits and slack rope", command))
     return found
-
-
-def _duration(result: xr.Dataset) -> float:
-    """Return the length of the runs [s]."""
-    return float(json.loads(result.attrs[ATTRIBUTE])["duration"])
 
 
 def _controller_words(swept: Swept, law: Path | None) -> list[str]:

@@ -15,8 +15,8 @@ from models.basics import InputError
 from models.vessel.readers import read_raos, write_raos
 from synth.sensitivity import sensitivity
 from synth.sensitivity.differences import StepError, derivative, sided_derivatives
+from synth.sensitivity.elasticity import FIGURES
 from synth.sensitivity.fields import numbers_of
-from synth.sensitivity.results import FIGURES
 
 STEP = 1e-3
 CRANE_GAINS = {"A": 1.0, "a": 0.25, "a1": 0.6, "a2": 0.02}
