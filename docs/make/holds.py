@@ -34,10 +34,8 @@ import stillhook as sh
 from models import Case, load_case
 from models.basics import (
     GRAVITY,
-    FloatArray,
     InputError,
     PhysicsWarning,
-    Quadrature,
     StillhookError,
 )
 from models.hook import HookDemand
@@ -93,7 +91,6 @@ SIGNALS: Mapping[str, tuple[str, str, str]] = {
 #: one that is found, and dynamic parts of the extremes, above and below what is static.
 FIGURES = ("sigma", "found", "error", "up", "ups", "down", "downs")
 POWER = ("power.up", "power.ups")
-REMNANT = "drive.set_point"  # where a design hears the noise of losses that switch
 KEYS = ("question", "case", "law", "depth", "mass", "delay", "H_s", "T_p", "structure")
 COLUMNS = (
     *KEYS,
@@ -443,6 +440,9 @@ def simulated(design: Design, seeds: Sequence[int], exposure: float = EXPOSURE) 
     were looked at twice would count more.
     """
     settle = min(SETTLE, exposure)
+    # A drag that a case gives is that of its plant, and no coefficient of the shape besides.
+    given = design.case.payload.fixed_drag
+    drag = {} if given is None else {"payload.linear_drag": given, "payload.quadratic_drag": 0.0}
 
     def told(seeds: Sequence[int]) -> tuple[list[Statistics], int]:
         runs = sh.simulate(
@@ -453,6 +453,7 @@ def simulated(design: Design, seeds: Sequence[int], exposure: float = EXPOSURE) 
             settle=settle,
             traces="worst",
             store_step=10.0,
+            parameters=drag,
         )
         return (
             [run.statistics for run in runs],
@@ -477,7 +478,7 @@ def simulated(design: Design, seeds: Sequence[int], exposure: float = EXPOSURE) 
     }
     for word in signals_in(design, first[0]):
         signal = SIGNALS[word][0]
-        printed, sigma = printed_sigma(design, signal), found_sigma(first + again, signal)
+        printed, sigma = design.switched.deviation(signal), found_sigma(first + again, signal)
         row |= {f"{word}.sigma": f"{printed:.5g}", f"{word}.found": f"{sigma:.5g}"}
         length = sum(one.duration for one in first + again)
         row[f"{word}.error"] = f"{relative_error(design, signal, length):.3g}"
@@ -505,39 +506,6 @@ def signals_in(design: Design, told: Statistics) -> list[str]:
     ]
 
 
-def with_losses(
-    design: Design, signal: str, *, noise: bool = True
-) -> tuple[Quadrature, FloatArray]:
-    """Return nodes, and there the density of a signal with the losses in it.
-
-    A simulated torque has its loss, Delta sgn(omega), in it, and so has a drum's line tension.  A
-    design tells both without, and has friction b omega and noise r on the command for the loss in
-    what moves: the signal is g + s (b omega + r), s its share of the motor's loss, all of it
-    coherent.  Without `noise` the remnant r is left out.
-    """
-    loop, loss = design.assessment, design.question.plant.loss
-    share = loss.get(signal, 0.0) / loss["motor.torque"] if loss.get(signal, 0.0) else 0.0
-    nodes = loop.quadrature([signal, "motor.speed"] if share else [signal])
-    omega, density = nodes.omega, np.zeros(nodes.omega.size)
-    for source in loop.disturbances:
-        if source.name == REMNANT and not noise:
-            continue
-        found = loop.response(signal, source.name, omega)
-        if share:
-            speed = loop.response("motor.speed", source.name, omega)
-            found = found + share * design.friction * speed
-            if source.name == REMNANT:
-                found = found - share * design.question.data.torque_per_command(1j * omega)
-        density += np.abs(found) ** 2 * source.density(omega)
-    return nodes, density
-
-
-def printed_sigma(design: Design, signal: str) -> float:
-    """Return the standard deviation that a design claims of a signal, its losses in it."""
-    nodes, density = with_losses(design, signal)
-    return math.sqrt(nodes.integrate(density))
-
-
 def found_sigma(told: Sequence[Statistics], signal: str) -> float:
     """Return the standard deviation of a signal in runs, about the mean of each."""
     return math.sqrt(np.mean([one[signal].standard_deviation ** 2 for one in told]))
@@ -548,7 +516,7 @@ def deviations(design: Design, told: Sequence[Statistics]) -> dict[str, tuple[fl
     found, length = {}, sum(one.duration for one in told)
     for word in signals_in(design, told[0]):
         signal = SIGNALS[word][0]
-        off = found_sigma(told, signal) / printed_sigma(design, signal) - 1.0
+        off = found_sigma(told, signal) / design.switched.deviation(signal) - 1.0
         found[word] = off, max(NEAR, ERRORS * relative_error(design, signal, length))
     return found
 
@@ -558,29 +526,26 @@ def extremes_of(
 ) -> dict[str, tuple[float, list[float]]]:
     """Return the dynamic parts of extremes up and down: the printed one, and those of the runs.
 
-    A signal that is at rest at zero has one limit, and goes as far either way.
+    A limit has the loss that switches in full; printed is what is most probable, which is less.
+    A signal that is at rest at zero has one limit, and goes as far either way.  Of a reference unit
+    with gain and phase errors it is as much more as the limit's worst signs are.
     """
     signal, peak, least = SIGNALS[word]
     rest = design.question.plant.static.get(signal, 0.0) if signal != PAYLOAD else 0.0
-    ups = [one[signal].maximum - rest for one in told]
-    downs = [rest - one[signal].minimum for one in told]
-    if signal == PAYLOAD:
-        most = design.assessment.peak(signal, exposure)
-        return {"up": (most, ups), "down": (most, downs)}
     still = peak in design.limits and abs(rest) < 1e-9 * design.limits[peak].value
-    ways = {"up": (peak, ups), "down": (peak if still else least, downs)}
+    limits = {one.name: one for one in (*design.question.limits, *design.question.reported)}
     found = {}
-    for way, (name, values) in ways.items():
-        if name not in design.limits:
-            continue
-        every = (*design.question.limits, *design.question.reported)
-        static = getattr(next(one for one in every if one.name == name), "static", 0.0)
-        value = design.limits[name].value
-        most = static - value if name == least else value - abs(static)
-        if exposure != EXPOSURE:  # what was printed is for longer runs
-            period = design.assessment.mean_period(signal)
-            most *= math.sqrt(math.log(exposure / period) / math.log(EXPOSURE / period))
-        found[way] = most, values
+    for way, name in (("up", peak), ("down", peak if still else least)):
+        sign = 1 if way == "up" else -1
+        ends = (one[signal].maximum if way == "up" else one[signal].minimum for one in told)
+        values = [sign * (end - rest) for end in ends]
+        if signal == PAYLOAD or name in design.limits:
+            most = design.switched.extreme(signal, exposure, sign)
+            if name in design.limits:
+                limit, loop = limits[name], design.assessment
+                own = abs(getattr(limit, "static", 0.0))
+                most *= (limit.worst(loop) - own) / (limit.measure(loop) - own)
+            found[way] = most, values
     return found
 
 
@@ -589,9 +554,9 @@ def relative_error(design: Design, signal: str, duration: float) -> float:
 
     Of a Gaussian signal of the printed spectrum, var(s^2) = (2 pi/T) int S^2 domega (Bartlett).
     """
-    nodes, density = with_losses(design, signal)
+    nodes, density = design.switched.spectrum(signal)
     power = nodes.integrate(density**2)
-    return 0.5 * math.sqrt(2.0 * math.pi * power / duration) / nodes.integrate(density)
+    return float(0.5 * math.sqrt(2.0 * math.pi * power / duration) / nodes.integrate(density))
 
 
 class Book:

@@ -84,6 +84,14 @@ def growth(row: Row) -> float:
     return max(float(row["growth_hysteretic"]), float(row["growth_kelvin-voigt"]))
 
 
+def grows(row: Row) -> bool:
+    """Return whether it grows where it was asked not to: a rope by Kelvin and Voigt is an exhibit.
+
+    Such a design is asked with the damping of its case alone; with the least it is told.
+    """
+    return row["law"] != "kelvin-voigt" and growth(row) >= 0.0
+
+
 def faults(row: Row) -> list[str]:
     """Return what a simulated row breaks."""
     found = []
@@ -99,7 +107,7 @@ def faults(row: Row) -> list[str]:
         found.append(f"{row['trips']} runs ended early")
     if float(row["saturated"]) > SATURATED:
         found.append(f"saturated for {float(row['saturated']):.2g} % of the time")
-    if growth(row) >= 0.0:
+    if grows(row):
         found.append(f"grows at {growth(row):.2g} 1/s at the least damping")
     return found
 
@@ -190,7 +198,7 @@ def summary(rows: Sequence[Row]) -> str:
         (
             "designs that grow at the rope's least damping, under either law",
             "0",
-            str(sum(growth(row) >= 0.0 for row in done)),
+            f"{sum(map(grows, done))}; {sum(growth(row) >= 0.0 for row in done)} with exhibits",
         ),
         ("runs that ended early", "0", str(sum(int(row["trips"]) for row in done))),
     ]

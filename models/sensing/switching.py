@@ -23,10 +23,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import TypeVar
 
 from ..basics import FloatArray
 from ..hook import HookMotion
@@ -47,13 +48,20 @@ _FAINT = 1e-12  # of the largest density, below which there is none
 _PER_DECADE, _POINTS = 16, 10  # motor speeds between which shapes are interpolated
 
 
-class SwitchingShape:
-    """The density of the remnant over Delta^2, with one motion of the hook.
+class _Moving(Protocol):
+    def density(self, omega: FloatArray, /) -> FloatArray: ...
+
+
+_Motion = TypeVar("_Motion", bound=_Moving, default=HookMotion)
+
+
+class SwitchingShape(Generic[_Motion]):
+    """The density of the remnant over Delta^2, with one motion: the hook's, or another.
 
     Only the shape of its velocity's density counts.
     """
 
-    def __init__(self, hook: HookMotion) -> None:
+    def __init__(self, hook: _Motion) -> None:
         self.hook = hook
         self._levels: dict[float, CubicSpline] = {}
 

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 PROTOCOL = ("name", "sample_time", "reset", "step")  #: What a controller has.
 
-_FEEDBACK_SAMPLE = 0.01  # of a design, unless told otherwise [s]
 
 CONTROLLER_TEXTS: Mapping[str, str] = MappingProxyType(
     {
@@ -65,8 +64,7 @@ def controller_by_name(
     if name.startswith("feedback"):
         given = gains if gains is not None else design
         law = gains_in_use(case) if given is None else given
-        T = _FEEDBACK_SAMPLE if sample_time is None else sample_time
-        return feedback_of(name, case, law, sample_time=T)
+        return feedback_of(name, case, law, sample_time=sample_time)
     if "mpc" not in name:
         from synth.controllers import BrakeOn, ConstantTension, VelocityFeedForward
 
@@ -101,9 +99,11 @@ def feedback_of(
     case: Case,
     law: Mapping[str, float] | LinearController | Design | Tuning,
     *,
-    sample_time: float = _FEEDBACK_SAMPLE,
+    sample_time: float | None = None,
 ) -> LinearFeedback:
     """Return linear feedback of gains, a controller or a design, by its name without anti-windup.
+
+    The sample time [s] is by default that of `synth.controllers.LinearFeedback`.
 
     Raises InputError if it is to be without, but has no states; or as
     `synth.controllers.LinearFeedback`.
@@ -156,8 +156,7 @@ def controller_of(
     if design is not None or gains is not None:
         raise InputError("simulate: design and gains are for a controller by its name")
     if isinstance(controller, Design | Tuning):
-        own = _FEEDBACK_SAMPLE if sample_time is None else sample_time
-        return feedback_of("feedback", case, controller, sample_time=own)
+        return feedback_of("feedback", case, controller, sample_time=sample_time)
     lacking = [name for name in PROTOCOL if not hasattr(controller, name)]
     if lacking:
         raise InputError(

@@ -24,6 +24,7 @@ from ..question import GAINS, HOOK, DesignQuestion, controller_for, difference_t
 from ..search import Start
 from ..structures import structure_named
 from ..verify import Verification, verify_design
+from .switched import SwitchedLoop
 from .tuning import LimitUse, verified_members
 
 if TYPE_CHECKING:
@@ -212,6 +213,14 @@ class Design:
         """
         known = self.question.coefficients_of(self.drag, self.friction)
         return self.question.assess(self._known, known)
+
+    @cached_property
+    def switched(self) -> SwitchedLoop:
+        """Deviations and most probable extremes, with the losses in them that switch.
+
+        The limits have the loss in full beside k sigma and are on the safe side of these.
+        """
+        return SwitchedLoop(loop=self.assessment, question=self.question, friction=self.friction)
 
     @cached_property
     def bound(self) -> BestPossible:

@@ -157,7 +157,7 @@ def test_what_a_row_keeps_is_kept_again(row):
     kept = {name for name, (off, may) in page.deviations(row).items() if abs(off) <= may}
     for word in kept:
         signal = holds.SIGNALS[word][0]
-        off = holds.found_sigma(told, signal) / holds.printed_sigma(design, signal) - 1.0
+        off = holds.found_sigma(told, signal) / design.switched.deviation(signal) - 1.0
         error = holds.relative_error(design, signal, length * len(seeds))
         assert abs(off) <= max(holds.NEAR, SURE * error), word
     near = {(one.signal, one.way) for one in page.extremes(row) if max(one.ratios) <= page.FARTHEST}

@@ -1,6 +1,6 @@
 """Losses that switch with the motor's direction, as a design counts them, against three hours.
 
-The simulation takes the loss as it is, Delta tanh(omega); see `holds.with_losses`.
+The simulation takes the loss as it is, Delta tanh(omega); see `synth.design.switched`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ DESIGNS: Mapping[str, Mapping[str, float]] = {
 
 def told(design: sh.Design, signal: str) -> tuple[float, float]:
     """Standard deviation of a signal with the loss in it, and its relative standard error."""
-    return holds.printed_sigma(design, signal), holds.relative_error(design, signal, EXPOSURE)
+    return design.switched.deviation(signal), holds.relative_error(design, signal, EXPOSURE)
 
 
 @pytest.mark.ci
@@ -61,5 +61,5 @@ def test_deviations_are_those_of_three_hours_with_losses_that_switch(structure: 
         wanted, error = told(design, signal)
         found = run.statistics[signal].standard_deviation
         assert abs(found / wanted - 1.0) < max(NEAR, ERRORS * error)
-        nodes, density = holds.with_losses(design, signal, noise=False)
-        assert nodes.integrate(density) < (0.9 * found) ** 2
+        noise = design.shares[signal]["drive.set_point"]
+        assert wanted**2 - noise**2 < (0.9 * found) ** 2

@@ -46,8 +46,8 @@ def test_feedback_takes_gains_before_a_design_before_those_of_the_case() -> None
         return controller_by_name("feedback", case, **given).step(Measurement(m), 0.0) - static
 
     assert asked() == pytest.approx(-200.0 * 100.0 * 0.01)
-    # Tustin at 10 ms: D, and half a sample of the integrator.
-    assert asked(design=Design()) == pytest.approx((-2.0 - 0.1 * 0.005) * 0.01)
+    # Tustin at 5 ms, a design's own: D, and half a sample of the integrator.
+    assert asked(design=Design()) == pytest.approx((-2.0 - 0.1 * 0.0025) * 0.01)
     gains = {"A": 2.0, "a": 0.0, "a1": 0.0, "a2": 3.0}
     assert asked(design=Design(), gains=gains) == pytest.approx(-6.0 * 0.01)
     without = controller_by_name("feedback-no-antiwindup", case, design=Design())

@@ -315,11 +315,11 @@ def test_a_tuned_low_order_controller_is_as_good_sampled_as_it_is_designed() -> 
         ),
         (
             LinearController(
-                A=[[200.0]], B=[[1.0]], C=[[1.0]], D=[[0.0]],
+                A=[[400.0]], B=[[1.0]], C=[[1.0]], D=[[0.0]],
                 measurements=("drum.haul",), inputs=COMMAND,
             ),
             {},
-            "has a pole at 200 1/s, which Tustin's rule maps to infinity",
+            "has a pole at 400 1/s, which Tustin's rule maps to infinity",
         ),
     ],
 )  # fmt: skip

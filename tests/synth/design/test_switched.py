@@ -1,0 +1,82 @@
+"""Deviations and extremes of signals with a loss that switches, against drawn Gaussian records."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from models.basics import Quadrature
+from synth.design.switched import SwitchedSignal
+
+_PEAK, _WIDE = 0.8, 0.25  # of the disturbance's density [rad/s]
+
+
+def signal(*, loss: float, carried: float = 0.0, phase: float = 0.6) -> SwitchedSignal:
+    """Return a signal and a speed that hear a narrow sea and a wide noise, in part the same."""
+    x, w = np.polynomial.legendre.leggauss(200)
+    omega, weights = 1.5 + 1.45 * x, 1.45 * w
+    sea = np.exp(-0.5 * ((omega - _PEAK) / _WIDE) ** 2)
+    noise = 0.3 * np.exp(-0.5 * ((omega - 1.9) / 0.4) ** 2)
+    even = np.ones_like(omega)
+    linear = np.stack([np.exp(1j * phase) * even, 0.8 * even])
+    speed = np.stack([1j * omega, 0.2 * even])
+    return SwitchedSignal(
+        nodes=Quadrature(omega=omega, weights=weights),
+        densities=np.stack([sea, noise]),
+        linear=linear,
+        carried=carried * linear * np.exp(0.3j),
+        speed=speed,
+        loss=loss,
+    )
+
+
+def record(one: SwitchedSignal, *, step: float = 0.02, seed: int = 11):
+    """Return A + s (Delta + B) of a record of two million samples, a sum of random waves."""
+    rng, count = np.random.default_rng(seed), 2**21
+    omega = 2.0 * math.pi * np.fft.rfftfreq(count, step)
+    inside = (omega > one.nodes.omega[0]) & (omega < one.nodes.omega[-1])
+    parts = np.zeros((3, omega.size), dtype=np.complex128)
+    for i, density in enumerate(one.densities):
+        size = 0.5 * np.sqrt(omega[1] * np.interp(omega[inside], one.nodes.omega, density))
+        drawn = rng.standard_normal((2, size.size))
+        wave = size * (drawn[0] + 1j * drawn[1])
+        for j, responses in enumerate((one.linear, one.carried, one.speed)):
+            parts[j, inside] += wave * np.interp(omega[inside], one.nodes.omega, responses[i])
+    A, B, speed = np.fft.irfft(parts, count) * count
+    return A + np.sign(speed) * (one.loss + B)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("phase", [0.1, 1.5, 2.8])
+@pytest.mark.parametrize(("loss", "carried"), [(0.0, 0.0), (0.4, 0.0), (1.0, 0.0), (0.6, 0.15)])
+def test_levels_are_crossed_as_often_as_in_a_drawn_record(loss, carried, phase, way):
+    one = signal(loss=loss, carried=carried, phase=phase)
+    drawn = way * record(one)
+    duration = 0.02 * drawn.size
+    for level in np.std(drawn) * np.array([1.0, 2.0, 2.7]):
+        seen = np.count_nonzero((drawn[:-1] < level) & (drawn[1:] >= level)) / duration
+        error = 3.5 / math.sqrt(seen * duration) + 0.03  # crossings come in groups
+        assert one.rate(level, way) == pytest.approx(seen, rel=error), (level, seen)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_most_probable_extreme_is_crossed_once(way):
+    one = signal(loss=0.7, carried=0.1)
+    assert one.rate(one.extreme(10_800.0, way), way) == pytest.approx(1.0 / 10_800.0, rel=1e-6)
+
+
+def test_without_a_loss_it_is_k_sigma():
+    one = signal(loss=0.0)
+    extreme = one.extreme(10_800.0)
+    assert one.rate(extreme) == pytest.approx(1.0 / 10_800.0, rel=1e-6)
+    assert extreme == pytest.approx(one.extreme(10_800.0, -1), rel=1e-12)
+
+
+def test_a_loss_that_turns_at_the_peaks_adds_less_than_one_that_goes_with_them():
+    """In a narrow band; what turns as the signal peaks adds its loss right after, to less."""
+    along, beside = (signal(loss=0.7, phase=phase) for phase in (0.5 * math.pi, 0.0))
+    still = signal(loss=0.0).extreme(10_800.0)
+    assert still < beside.extreme(10_800.0) < along.extreme(10_800.0)
+    assert along.extreme(10_800.0) == pytest.approx(still + 0.7, rel=1e-3)
