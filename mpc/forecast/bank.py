@@ -4,20 +4,17 @@ r"""The hook foretold by whoever of a bank of seas has foretold it best: `SeaBan
 
 What the filter knows of the hook now and has known over the last forty seconds is regressed on
 what is to come.  The regression of a sea follows from its tabulated spectrum alone: with
-covariance G of what is remembered (a floor on its error on the diagonal), and that of it and
-of what is asked for g, the forecast is
+covariances G of what is remembered, m, with a floor on its error, and g of it with what is asked,
 
 .. math::  \hat y(t + \ell) = g_\ell' G^{-1} m(t),
 
-the Wiener forecast of finite memory (Hannan, *Multiple Time Series*, 1970, ch. 3).  A rational
-sea of few states, such as the filter's own, cannot use a hook that is known this well.
+the Wiener forecast of finite memory (Hannan, *Multiple Time Series*, 1970, ch. 3).
 
 Besides the sea that the case tells there are seas of one system, with peaks of 5 to 18 s, and of
-two, and the autoregression that learns the record (`mpc.forecast.autoregressive`).  Each foretells
-all the time, and is judged by what came of it one, two and four seconds later: over a minute
-and a half, errors of mean square e weigh a sea by e to the power of minus half the number of errors
-that are independent.  The sea that was told has most of the weight at first; when next to nothing
-is left of it, the sea is not as told (`SeaBank.misfit`).
+two, and the autoregression that learns the record (`mpc.forecast.autoregressive`).  Each is judged
+by what came of it one, two and four seconds later: errors of mean square e over a minute and a half
+weigh a sea by e to the power of minus half the number of errors that are independent.  When next to
+nothing is left of the sea that was told, it is not as told (`SeaBank.misfit`).
 """
 
 import math
@@ -44,15 +41,13 @@ _SETTLING = 60.0  # [s], after which it has settled; all taps are used when it h
 _PEAKS = np.geomspace(5.0, 18.0, 20)  # of seas of one system [s]
 _GAMMAS = (1.0, 3.3)
 _SWELLS, _WINDS, _SHARES = (10.0, 11.5, 13.0, 14.7, 16.5), (5.0, 5.8, 6.7, 7.8), (0.3, 0.6, 0.85)
-_JUDGED = (1.0, 2.0, 4.0)  # leads [s]
-_EVERY = 0.5  # [s] from one judgement to the next
+_JUDGED, _EVERY = (1.0, 2.0, 4.0), 0.5  # leads, and from one judgement to the next [s]
 _MEMORY, _BEGIN = 90.0, 5.0  # [s], of the errors, and before which nothing is judged
 _INDEPENDENT = 2.0  # leads, after which an error is another
 _LONG = 60.0  # [s], over which somebody has to have been judged who came later
 _TOLD = 0.999  # share of the sea that is told before anything is known
 _MISFIT, _FITS = 1e-6, 0.5  # share below which the sea is not as told, above which it is again
-_FAINT = 2e-3  # share of a member that is left out
-_MOVED = 0.02  # change of the shares for which the forecast is made anew
+_FAINT, _MOVED = 2e-3, 0.02  # share that is left out; change for which the FIR is made anew
 _NODES = np.concatenate([np.arange(0.01, 4.0, 0.01), np.arange(4.0, 60.0, 0.05)])  # [rad/s]
 
 
@@ -101,14 +96,12 @@ class SeaBank:
         # The autoregression hears every so manieth sample; what it foretells is moved on between.
         sparse = self._step * T
         farthest = max(float(self.leads[-1]), max(_JUDGED)) + 2.0 * sparse
-        self._learnt = AdaptiveAR(
-            sample_time=sparse, horizon=farthest, spacing=max(1.0, 4.0 * sparse)
-        )
-        self._moved = [
-            hermite_weights(self._learnt.leads, knots + k * T) for k in range(self._step)
-        ]
+        wide = max(1.0, 4.0 * sparse)
+        self._learnt = AdaptiveAR(sample_time=sparse, horizon=farthest, spacing=wide)
+        own = self._learnt.leads
+        self._moved = [hermite_weights(own, knots + k * T) for k in range(self._step)]
         to_judged = [np.array((self._ahead + k) * T) for k in range(self._step)]
-        self._to_judged = [hermite_weights(self._learnt.leads, at)[: at.size] for at in to_judged]
+        self._to_judged = [hermite_weights(own, at)[: at.size] for at in to_judged]
         members = len(self._tables.rows[0]) + 1
         self._prior = np.full(members, math.log((1.0 - _TOLD) / (members - 1)))
         self._prior[0] = math.log(_TOLD)
@@ -175,17 +168,22 @@ class SeaBank:
 
     def _judge(self, heave: float) -> None:
         """Weigh everybody by the errors that have come to light."""
-        turn = self._age // self._every
-        ago = self._ahead // self._every
+        turn, ago = self._age // self._every, self._ahead // self._every
         made = self._made[(turn - ago) % self._depth, :, np.arange(ago.size)].T
         if self._good > self._ahead.max():
             known = np.isfinite(made)
-            count = self._judged + _EVERY * known[:, -1:]
-            self._judged = np.minimum(count, _MEMORY)
+            self._judged = np.minimum(self._judged + _EVERY * known[:, -1:], _MEMORY)
             share = _EVERY / np.maximum(self._judged, _EVERY)
             self._errors += share * np.where(known, (made - heave) ** 2 - self._errors, 0.0)
             if known[0, -1]:
-                self._weigh()
+                count = float(self._judged[0, 0]) / (_INDEPENDENT * np.array(_JUDGED))
+                score = self._prior - 0.5 * np.log(np.maximum(self._errors, 1e-300)) @ count
+                score[self._judged[:, 0] < min(float(self._judged[0, 0]), _LONG)] = -np.inf
+                shares = np.exp(score - score.max())
+                self.shares = shares / shares.sum()
+                self.misfit = bool(self.shares[0] < (_FITS if self.misfit else _MISFIT))
+                if np.abs(self.shares - self._blended).sum() > _MOVED:
+                    self._blend()
         now = self._made[turn % self._depth]
         now[:] = np.nan
         if self._age * self.sample_time > _BEGIN:
@@ -193,26 +191,14 @@ class SeaBank:
             if self._learnt.ready:
                 now[-1] = self._to_judged[(self._age - 1) % self._step] @ self._path()
 
-    def _weigh(self) -> None:
-        """Weigh everybody by the errors made so far."""
-        count = float(self._judged[0, 0]) / (_INDEPENDENT * np.array(_JUDGED))
-        score = self._prior - 0.5 * np.log(np.maximum(self._errors, 1e-300)) @ count
-        score[self._judged[:, 0] < min(float(self._judged[0, 0]), _LONG)] = -np.inf
-        share = np.exp(score - score.max())
-        self.shares = share / share.sum()
-        self.misfit = bool(self.shares[0] < (_FITS if self.misfit else _MISFIT))
-        if np.abs(self.shares - self._blended).sum() > _MOVED:
-            self._blend()
-
     def _blend(self) -> None:
         """Make one FIR of all that matter."""
         share = np.where(self.shares > _FAINT, self.shares, 0.0)
         self._blended = share = share / share.sum()
         at = np.flatnonzero(share[:-1])
-        rows, variance = self._tables.rows[self._length], self._tables.variance[self._length]
+        rows, own = self._tables.rows[self._length], share[:-1] + 1e-9
         self._mixed = np.ascontiguousarray(np.tensordot(share[at], rows[at], axes=1))
-        own = share[:-1] + 1e-9
-        spread = np.maximum(own @ variance / own.sum(), 0.0)
+        spread = np.maximum(own @ self._tables.variance[self._length] / own.sum(), 0.0)
         judged = np.interp(_JUDGED, self._knots, spread[0::2])
         # Before anybody is judged the sea is as high as is told.
         scale = self._tables.power

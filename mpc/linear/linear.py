@@ -80,9 +80,8 @@ class LinearMPC(WinchMPC):
         a `mpc.forecast.forecast.Predictor` of the same sample time and horizon, which is shown what
         the estimator knows of the hook if it has ``fused = True``, else what the unit shows.
     preview
-        What somebody else foretells of the hook, such as a wave radar: a predictor of the same
-        sample time, of the horizon or less, whose standard deviations say how far it is to be
-        believed.  It is fused with that of `predictor`, which must not be ``kalman``.
+        What somebody else foretells of the hook, such as a wave radar: a predictor of the horizon
+        or less, fused by its standard deviations with `predictor`, which must not be ``kalman``.
     masses
         Masses along the rope; by default those of the case.
     minimum_tension
