@@ -26,6 +26,7 @@ SCRIPTS: Mapping[str, str] = {
     "landing_designs.csv": "docs/make/landing.py",
     "mpc_solvers.csv": "benchmarks/mpc_speed.py",
     "mpc_steps.csv": "benchmarks/mpc_speed.py",
+    "other_seas.csv": "docs/make/other_seas.py",
     "pareto.csv": "docs/make/robust.py",
     "random_starts.csv": "docs/make/random_starts.py",
     "robust.csv": "docs/make/robust.py",

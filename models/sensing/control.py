@@ -52,6 +52,7 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "engaged": "",
         "limited": "",
         "gated": "the controller did not believe a sensor",
+        "misfit": "the sea is not as the controller was told, which goes by others",
         "blind": "the controller has heard nothing of the payload for a second",
         "fallback": "the controller had no answer in time and fell back on a simpler law",
     }

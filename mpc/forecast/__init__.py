@@ -10,7 +10,8 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .autoregressive import AdaptiveAR
-    from .forecast import Forecast, Predictor
+    from .bank import SeaBank
+    from .forecast import Forecast, Predictor, fused
     from .preview import PerfectPreview
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -15,6 +15,7 @@ import numpy as np
 from models.basics import FloatArray, check_range, read_only
 
 _MOST_LEADS = 100_000
+_FADING = 1.0  # [s], in which what a shorter forecast has put right is forgotten beyond its end
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -67,3 +68,21 @@ def leads_of(owner: str, sample_time: float, horizon: float) -> FloatArray:
     step = check_range(owner, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
     last = check_range(owner, "horizon", horizon, low=0.0, high=_MOST_LEADS * step, unit="s")
     return read_only(step * np.arange(round(last / step) + 1))
+
+
+def fused(own: Forecast, other: Forecast, sample_time: float) -> Forecast:
+    """Return two forecasts as one, each weighed by its variance.
+
+    Where the other ends sooner, what it has put right at its end fades out.
+    """
+    n, size = other.displacement.size, own.displacement.size
+    at = np.minimum(np.arange(size), n - 1)
+    fading = np.exp(-sample_time / _FADING * (np.arange(size) - at))
+    found = []
+    for name in ("displacement", "velocity"):
+        mean, std = getattr(own, name), getattr(own, f"{name}_std")
+        variance = std[:n] ** 2
+        share = variance / np.maximum(variance + getattr(other, f"{name}_std") ** 2, 1e-300)
+        change = share * (getattr(other, name) - mean[:n])
+        found += [mean + fading * change[at], std * np.sqrt(1.0 - share[at] * fading**2)]
+    return Forecast(found[0], found[2], found[1], found[3])

@@ -35,7 +35,7 @@ from models.operation import Motion
 from models.plant import SPEED_BAND, DriveLimits, late_hold
 from models.sensing import HEARD, Controller, Measurement
 
-from ..forecast import AdaptiveAR, Forecast, PerfectPreview, Predictor
+from ..forecast import AdaptiveAR, Forecast, PerfectPreview, Predictor, SeaBank, fused
 from ..programme import Condensed, QPSolution, SoftQP, default_blocking, kkt_residual
 from ..winch import (
     PredictionModel,
@@ -77,7 +77,8 @@ class WinchOptions(TypedDict, total=False):
     sample_time: float
     blocking: Sequence[int] | None
     weights: Weights | None
-    predictor: Literal["kalman", "ar", "preview"] | Predictor
+    predictor: Literal["bank", "kalman", "ar", "preview"] | Predictor
+    preview: Predictor | None
     masses: int | None
     minimum_tension: float | None
     excursion: float | None
@@ -94,7 +95,7 @@ class WinchMPC(ABC):
 
     Parameters
     ----------
-    case, horizon, sample_time, blocking, weights, predictor, masses
+    case, horizon, sample_time, blocking, weights, predictor, preview, masses
         As for `LinearMPC`.
     minimum_tension, excursion, thermal, deadline, prove, limits, name, fallback
         As for `LinearMPC`.
@@ -133,7 +134,8 @@ class WinchMPC(ABC):
         sample_time: float = 0.05,
         blocking: Sequence[int] | None = None,
         weights: Weights | None = None,
-        predictor: Literal["kalman", "ar", "preview"] | Predictor = "kalman",
+        predictor: Literal["bank", "kalman", "ar", "preview"] | Predictor = "kalman",
+        preview: Predictor | None = None,
         masses: int | None = None,
         minimum_tension: float | None = None,
         excursion: float | None = None,
@@ -173,10 +175,23 @@ class WinchMPC(ABC):
         self.soft_limits = _soft_limits(self.model, limits, least, excursion)
         self._blocks = tuple(int(b) for b in blocks)
         self.predictor, word = _predictor(case, predictor, T, self.horizon)
+        self.preview = preview
+        if preview is not None:
+            short = len(preview.leads) <= round(self.horizon / T) + 1
+            if not (short and self.predictor is not None and math.isclose(preview.sample_time, T)):
+                raise InputError(
+                    f"{_OWNER}: preview must forecast every {T:g} s, for no longer than the "
+                    f"horizon of {self.horizon:g} s, beside a predictor that is not kalman"
+                )
         self.name = word if name is None else name
+        # Who is handed the record is named so, whatever its predictor is called.
+        told = any(hasattr(source, "foresee") for source in (self.predictor, preview))
+        if told and "preview" not in self.name:
+            self.name += "-preview"
         # A path that comes from outside tells where the sea is at its end, if it is known how well
         # the estimator knows it at the start.
         self._sea_covariance = None if self.predictor is None else self.estimator.sea_covariance
+        self._shows = np.ascontiguousarray(believed.hook[:, believed.sea_at])  # of the sea's state
         unit = case.winch.drive.torque_peak
         self.window = DriveWindow(self.model.winch, limits, len(blocks), unit)
         if fallback is not None and not math.isclose(fallback.sample_time, T):
@@ -212,14 +227,17 @@ class WinchMPC(ABC):
             return "blind"
         if self.estimator.gated:
             return "gated"
+        if getattr(self.predictor, "misfit", False):
+            return "misfit"
         full = abs(self._asked) >= self.window.peak * (1.0 - _EDGE)
         return "limited" if full else "engaged"
 
     def foresee(self, motion: Motion) -> None:
-        """Give the record to come to a predictor that needs it."""
-        given = getattr(self.predictor, "foresee", None)
-        if given is not None:
-            given(motion)
+        """Give the record to come to a predictor, or a preview, that needs it."""
+        for source in (self.predictor, self.preview):
+            given = getattr(source, "foresee", None)
+            if given is not None:
+                given(motion)
 
     def reset(self) -> None:
         """Forget every earlier measurement."""
@@ -227,8 +245,9 @@ class WinchMPC(ABC):
         self.qp.reset()
         if self._budget is not None:
             self._budget.reset()
-        if self.predictor is not None:
-            self.predictor.reset()
+        for source in (self.predictor, self.preview):
+            if source is not None:
+                source.reset()
         self._plan: FloatArray | None = None  # the last good moves if limited, how old they are
         self._age = 0
         if self._fallback is not None:
@@ -237,7 +256,7 @@ class WinchMPC(ABC):
         self._asked = self.model.winch.rest_torque  # of the drive at the sample before [N m]
         self._set_point = np.zeros(2)  # displacement [m] and velocity [m/s], the last finite one
         self._counts = dict.fromkeys(
-            ("steps", "iterations", "late", "unproved", "gated", "blind", "fallback"), 0
+            ("steps", "iterations", "late", "unproved", "gated", "blind", "misfit", "fallback"), 0
         )
         self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
         self.solved: QPSolution | None = None
@@ -271,9 +290,18 @@ class WinchMPC(ABC):
         """Return the predictor's forecast, None where the hook moves as the estimator's sea."""
         if self.predictor is None:
             return None
-        heave, rate = float(shown[_HEAVE]), float(shown[_RATE])
-        self.predictor.update(heave, rate, bool(shown[_UNIT] > 0.5), time)
-        return self.predictor.forecast()
+        heave, rate, valid = float(shown[_HEAVE]), float(shown[_RATE]), bool(shown[_UNIT] > 0.5)
+        if self.preview is not None:
+            self.preview.update(heave, rate, valid, time)
+        if getattr(self.predictor, "fused", False):
+            at = self.model.sea_at
+            heave, rate = (self._shows @ self.estimator.state[at]).tolist()
+            valid = not self.estimator.blind
+        self.predictor.update(heave, rate, valid, time)
+        own = self.predictor.forecast()
+        if self.preview is None:
+            return own
+        return fused(own, self.preview.forecast(), self.sample_time)
 
     def _reference(self, shown: FloatArray) -> FloatArray:
         """Return the displacement [m] and velocity [m/s] that are asked for, (2,).
@@ -396,6 +424,8 @@ def _predictor(
         return given, "mpc"
     if given == "kalman":
         return None, "mpc"
+    if given == "bank":
+        return SeaBank(case, sample_time=sample_time, horizon=horizon), "mpc"
     if given == "ar":
         unit = case.sensors.mru
         if unit is None:
@@ -407,7 +437,8 @@ def _predictor(
     if given == "preview":
         return PerfectPreview(sample_time=sample_time, horizon=horizon), "mpc-preview"
     raise InputError(
-        f"{_OWNER}: predictor must be one of kalman, ar, preview or a Predictor, got {given!r}"
+        f"{_OWNER}: predictor must be one of bank, kalman, ar, preview or a Predictor, "
+        f"got {given!r}"
     )
 
 

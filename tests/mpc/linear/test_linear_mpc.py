@@ -619,7 +619,7 @@ def test_the_names_of_what_it_hears_are_those_of_the_simulator():
         ({"sample_time": 0.0}, "sample_time must be above 0 s"),
         ({"horizon": 0.1}, "horizon must be in"),
         ({"blocking": (1, 0)}, "blocking must be whole numbers of at least 1"),
-        ({"predictor": "crystal ball"}, "one of kalman, ar, preview"),
+        ({"predictor": "crystal ball"}, "one of bank, kalman, ar, preview"),
         ({"excursion": -1.0}, "excursion must be above 0 m"),
         ({"deadline": 0.0}, "deadline must be above 0 s"),
         ({"torque_rate": 0.0}, "torque_rate must be above 0 N m/s"),
