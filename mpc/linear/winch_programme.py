@@ -1,6 +1,6 @@
 r"""The condensed programme of the winch: its horizon, limited signals, and the sea beyond.
 
-    PredictionModel, LQRegulator, blocks --> Horizon --> `mpc.programme.condensed` --> Condensed
+    PredictionModel, LQRegulator, blocks --> Horizon --> `mpc.programme.horizon` --> Condensed
 
 The moves are torques in units of the peak, the path is displacement and velocity of the hook
 (z_0, z'_0, z_1, z'_1, ...), the cost is that of the payload over the hook's rms, and the constants

@@ -23,7 +23,7 @@ not grow with the masses of the rope.  J is block diagonal, G block lower triang
 force acts on what comes after it.
 
 The cost is a sum of squares, so that its Gauss-Newton Hessian is that of the linearised
-outputs; with the forces' slope zero, all is that of `mpc.programme.condensed`.
+outputs; with the forces' slope zero, all is that of `mpc.programme.horizon`.
 """
 
 from __future__ import annotations

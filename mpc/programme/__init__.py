@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .condensed import Condensed, Horizon, condense, default_blocking, free_outputs
+    from .horizon import Condensed, Horizon, condense, default_blocking, free_outputs
     from .kalman import ChangingGains, corrected, end_of_record, kalman_gain, prediction_covariance
     from .qp import QPSolution, SoftQP, kkt_residual
     from .regulator import LQRegulator, lq_regulator
