@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .horizon import Condensed, Horizon, condense, default_blocking, free_outputs
+    from .condensed import Condensed, Constraint, Question
+    from .horizon import Horizon, Signals, default_blocking, free_outputs
     from .kalman import ChangingGains, corrected, end_of_record, kalman_gain, prediction_covariance
     from .qp import QPSolution, SoftQP, kkt_residual
     from .regulator import LQRegulator, lq_regulator

@@ -1,39 +1,20 @@
-r"""The condensed quadratic programme: every state of the horizon eliminated, the moves blocked.
-
-.. math::
-
-    \min_v \; \tfrac12 v' H v + f' v \quad \text{subject to} \quad
-    l \le v \le u, \quad \underline r \le R v + r_0 \le \overline r \ \text{(soft)},
-
-with the inputs d held over blocks of samples (`Horizon`), the cost that of the regulator
-(`mpc.programme.regulator`),
-
-.. math::
-
-    J = \sum_{j=1}^{N-1} p_j^2 + \rho \sum_{j=0}^{N-1} (d_j - d_\infty c)^2
-        + x_N' P x_N + 2 x_N' N_\zeta \zeta_N ,
-
-and everything divided by N times a scale.  Gradient f and free response r_0 are linear in what is
-known at the sample: the plant's state x, the constants c, and the path w of the disturbance at
-the N + 1 samples of the horizon.  All products that do not change are made here, once.
-
-zeta_N holds the state of the disturbance's own model at the end of the horizon, where the path ends
-and that model goes on.
-
-`Horizon` holds the states of a sampled plant over a horizon, with the moves blocked.
+r"""A sampled plant over a horizon, as columns: `Horizon`, and what depends on them: `Signals`.
 
 .. math::
 
     x_{j+1} = A x_j + B d_j + \Gamma_w (w_j, w_{j+1}) + \Gamma_c c, \qquad d_j = u \, v_{b(j)}
 
-with w a disturbance that is known along a path, c constant disturbances, v the moves, each of
-which is held over its block b of samples, and u their unit.  Every state is a linear function of
-the *columns* (x_0, path, c, v), in this order, the path being w_0, w_1, ... one after the other.
+with w known along a path (disturbances and references), c constant disturbances, v the moves, each
+of which is held over its block b of samples, and u the units of the inputs.  Every state is a
+linear function of the *columns* (x_0, path, c, v), in this order, the path being w_0, w_1, ... one
+after the other, and the moves those of the first block, of the second, ...
+
+`sampled` makes the matrices of any `models.LinearPlant`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,127 +22,22 @@ import numpy as np
 import numpy.typing as npt
 
 from models.basics import FloatArray, ReadOnlyArrays, check_range
-
-from .regulator import LQRegulator
+from models.plant import LinearPlant, hermite_hold, zero_order_hold
 
 IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Condensed(ReadOnlyArrays):
-    """Matrices of the programme; `condense` makes it."""
-
-    horizon: Horizon  #: Plant, blocks and unit of the moves.
-    H: FloatArray  #: (nb, nb), per unit of a move.
-    #: Gradient f of the horizon's columns but the moves, (nb, columns), and of the disturbance's
-    #: state at the end of the horizon, (nb, nh).
-    gradient: FloatArray
-    from_end: FloatArray
-    at: IntArray  #: Sample of each row, (nr,).
-    kind: IntArray  #: What each row is: a number of the caller's, (nr,).
-    rows: FloatArray  #: r_0 and R, by the horizon's columns, (nr, columns).
-    #: Signal on which the bounds of the moves depend (the motor's speed) at the start of each
-    #: block, by the horizon's columns, (nb, columns).
-    speeds: FloatArray
-    cost: float  #: What the cost is divided by.
-
-    @property
-    def blocks(self) -> tuple[int, ...]:
-        """Length of each block in samples, (nb,)."""
-        return self.horizon.blocks
-
-    @property
-    def unit(self) -> float:
-        """Input of a move of one."""
-        return self.horizon.unit
-
-    @property
-    def steps(self) -> int:
-        """Number of samples N of the horizon."""
-        return self.horizon.steps
-
-
-def condense(
-    horizon: Horizon,
-    regulator: LQRegulator,
-    *,
-    output: FloatArray,
-    scale: float,
-    speed: FloatArray,
-    signals: Callable[[int, FloatArray], Iterable[tuple[int, FloatArray]]],
-) -> Condensed:
-    """Return the matrices of the programme.
-
-    Parameters
-    ----------
-    horizon
-        Plant and blocks.
-    regulator
-        Weight of the input, and the value function that ends the horizon; the constants are the
-        last of its disturbance.
-    output
-        Row of the state whose square is the cost, (n,).
-    scale
-        What the cost of a sample is divided by.
-    speed
-        Row of the state on which the bounds of the moves depend, (n,).
-    signals
-        Gives (kind, row of the columns) of what may be limited at sample j, of j and x_j.
-    """
-    constants, moves = horizon.constants, horizon.moves
-    N, nb = horizon.steps, len(horizon.blocks)
-    H, gradient = np.zeros((nb, nb)), np.zeros((nb, moves.start))
-    rows, at, kind, speeds = [], [], [], []
-    starts = set(horizon.starts)
-    for j, S in enumerate(horizon.states()):
-        if 0 < j < N:  # the first is past, and the last in the value function
-            p = output @ S
-            H += np.outer(p[moves], p[moves])
-            gradient += np.outer(p[moves], p[: moves.start])
-        for which, row in signals(j, S):
-            rows.append(row)
-            at.append(j)
-            kind.append(which)
-        if j in starts:
-            speeds.append(speed @ S)
-    lengths = np.array(horizon.blocks, dtype=np.float64)
-    nc = constants.stop - constants.start
-    nh = regulator.N.shape[1] - nc
-    # The input is weighed as it differs from what holds the output against the constants.
-    H += regulator.weight * horizon.unit**2 * np.diag(lengths)
-    steady = regulator.steady[nh:]
-    gradient[:, constants] -= regulator.weight * horizon.unit * np.outer(lengths, steady)
-    # The rest of the cost, from the horizon's end to infinity, is the regulator's value function.
-    end = S[:, moves]
-    H += end.T @ regulator.P @ end
-    gradient += end.T @ regulator.P @ S[:, : moves.start]
-    gradient[:, constants] += end.T @ regulator.N[:, nh:]
-
-    cost = N * scale
-    return Condensed(
-        horizon=horizon,
-        H=(H + H.T) / cost,
-        gradient=2.0 * gradient / cost,
-        from_end=2.0 * end.T @ regulator.N[:, :nh] / cost,
-        at=np.array(at),
-        kind=np.array(kind),
-        rows=np.array(rows).reshape(len(rows), moves.stop),
-        speeds=np.array(speeds),
-        cost=cost,
-    )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Horizon(ReadOnlyArrays):
-    """A sampled plant of one input, and the blocks of its moves."""
+    """A sampled plant, and the blocks of its moves."""
 
-    #: (n, n), (n, 1), (n, 2 nw), (n, nc).
+    #: (n, n), (n, nu), (n, 2 nw), (n, nc).
     A: FloatArray
     B: FloatArray
     from_path: FloatArray
     from_constants: FloatArray
     blocks: tuple[int, ...]  #: Length of each block in samples, (nb,).
-    unit: float  #: Input of a move of one.
+    units: FloatArray  #: Inputs of a move of one, (nu,).
 
     @cached_property
     def steps(self) -> int:
@@ -199,28 +75,73 @@ class Horizon(ReadOnlyArrays):
     def moves(self) -> slice:
         """Columns of the moves."""
         first = self.constants.stop
-        return slice(first, first + len(self.blocks))
+        return slice(first, first + len(self.blocks) * len(self.units))
 
     def ends(self, j: int) -> slice:
-        """Return the columns of the path at both ends of sample j."""
+        """Return the columns of the path at both ends of sample j; at N of the one end."""
         n, nw = self.from_path.shape
-        return slice(n + nw // 2 * j, n + nw // 2 * j + nw)
+        first = n + nw // 2 * j
+        return slice(first, min(first + nw, self.path.stop))
 
-    def move(self, j: int) -> int:
-        """Return the column of the move that acts over sample j."""
-        return int(self.moves.start + self.block[j])
+    def move(self, j: int) -> slice:
+        """Return the columns of the moves that act over sample j."""
+        first = self.moves.start + len(self.units) * int(self.block[j])
+        return slice(first, first + len(self.units))
 
     def states(self) -> Iterator[FloatArray]:
         """Yield x_0, x_1, .. x_N by the columns, (n, columns) each."""
         S = np.eye(len(self.A), self.moves.stop)
         yield S
-        pushed = self.B[:, 0] * self.unit
+        pushed = self.B * self.units
         for j in range(self.steps):
             S = self.A @ S
             S[:, self.ends(j)] += self.from_path
             S[:, self.constants] += self.from_constants
             S[:, self.move(j)] += pushed
             yield S
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Signals(ReadOnlyArrays):
+    """Signals s = C x + D d + F (w_j, w_j+1) + G c, by name."""
+
+    names: tuple[str, ...]
+    C: FloatArray
+    D: FloatArray
+    F: FloatArray
+    G: FloatArray
+
+    def at(self, horizon: Horizon, j: int, S: FloatArray) -> FloatArray:
+        """Return the signals of sample j by the columns, (ns, columns), of x_j by the columns."""
+        rows = self.C @ S
+        here = horizon.ends(j)
+        rows[:, here] += self.F[:, : here.stop - here.start]
+        rows[:, horizon.constants] += self.G
+        if j < horizon.steps:
+            rows[:, horizon.move(j)] += self.D * horizon.units
+        return rows
+
+    @cached_property
+    def at_end(self) -> npt.NDArray[np.bool_]:
+        """Which need no input and no path to come, and so are known at the end too, (ns,)."""
+        later = self.F[:, self.F.shape[1] // 2 :]
+        return np.asarray(~(self.D.any(axis=1) | later.any(axis=1)))
+
+
+def sampled(plant: LinearPlant, period: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return A, B and from_path of any linear plant, for samples of a period [s].
+
+    Inputs and disturbances are held over a sample, exactly; a disturbance that comes with its rate
+    moves along the cubic through both at either end.
+    """
+    nu, nw = len(plant.inputs), len(plant.disturbances)
+    A, held = zero_order_hold(plant.A, np.hstack([plant.B, plant.E]), period)
+    from_path = np.hstack([held[:, nu:], np.zeros((len(A), nw))])
+    for rate, base in plant.rates.items():
+        pair = [plant.disturbances.index(base), plant.disturbances.index(rate)]
+        moved = hermite_hold(plant.A, plant.E[:, pair], period, period)[0]
+        from_path[:, [*pair, *(nw + k for k in pair)]] = moved
+    return A, held[:, :nu], from_path
 
 
 def default_blocking(owner: str, horizon: float, sample_time: float) -> tuple[int, ...]:

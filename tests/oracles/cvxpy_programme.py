@@ -104,7 +104,7 @@ def oracle(controller: LinearMPC) -> Oracle:
     steady, nh = winch.steady / p.unit, controller.model.sea.order
     cross = weights.N * size[:, None] / p.cost
     cost: Any = cp.sum_squares((winch.payload * size) @ x[:, 1:N]) / p.cost
-    cost += weights.weight * p.unit**2 / p.cost * cp.sum_squares(d - steady @ constants)
+    cost += weights.weights[1] * p.unit**2 / p.cost * cp.sum_squares(d - steady @ constants)
     cost += cp.sum_squares(root.T @ x[:, N])
     cost += 2.0 * x[:, N] @ (cross[:, :nh] @ end + cross[:, nh:] @ constants)
     price: Any = 0.0
@@ -117,7 +117,7 @@ def oracle(controller: LinearMPC) -> Oracle:
         else:
             value = ((winch.speed if name == "speed" else winch.payload) * size) @ x[:, j]
         lowest, highest = controller.soft_limits[name]
-        scale = controller.products.scale[k]
+        scale = controller.programme.scale[k]
         for beyond in (
             (value - highest) if np.isfinite(highest) else None,
             (lowest - value) if np.isfinite(lowest) else None,

@@ -42,7 +42,7 @@ def question_of(controller: LinearMPC, chi: np.ndarray):
     speed = float(controller.model.winch.speed @ chi[: controller.model.winch.size])
     moves = len(controller.programme.blocks)
     low, high = controller.window.bounds(speed, np.zeros(moves), math.inf)
-    return controller.products.question(gradient, free, low, high), low, high
+    return controller.programme.question(gradient, free, low, high), low, high
 
 
 def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tuple[float, dict]:
@@ -67,7 +67,7 @@ def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tup
         ends = np.concatenate([shown @ sea, shown @ after])
         x = winch.A @ x + winch.B[:, 0] * d[j] + winch.from_hook @ ends + winch.from_constants @ c
         sea = after
-        cost += weights.weight * (d[j] - steady) ** 2
+        cost += weights.weights[1] * (d[j] - steady) ** 2
         if j + 1 < p.steps:
             cost += (winch.payload @ x) ** 2
     seen["speed", p.steps] = winch.speed @ x
@@ -91,13 +91,13 @@ def test_programme_is_the_cost_of_stepping_the_model(name):
         v = rng.normal(size=n)
         cost, seen = simulated_cost(controller, chi, v)
         assert 0.5 * v @ p.H @ v + f @ v == pytest.approx(cost - base, rel=1e-8, abs=1e-8 * base)
-        rows = controller.products.rows @ v
+        rows = controller.programme.qp.rows @ v
         for k, (j, kind) in enumerate(zip(p.at, p.kind, strict=True)):
             # row + free response = signal, in units of its limit
-            free = controller.products.low[k] - lower[n + k]
+            free = controller.programme.row_low[k] - lower[n + k]
             if WATCHED[kind] == "command" and not controller.model.winch.dc:
                 continue
-            wanted = seen[WATCHED[kind], j] * controller.products.scale[k]
+            wanted = seen[WATCHED[kind], j] * controller.programme.scale[k]
             assert rows[k] + free == pytest.approx(wanted, rel=1e-7, abs=1e-9)
 
 
@@ -195,7 +195,7 @@ def test_a_soft_limit_that_costs_more_is_violated_less():
     rng = np.random.default_rng(4)
     chi = state_of(controller, rng, 0.3)
     question, _, _ = question_of(controller, chi)
-    rows, H = controller.products.rows, controller.programme.H
+    rows, H = controller.programme.qp.rows, controller.programme.H
     n = len(H)
     beyond = []
     for price in (1e-8, 1e-4, 1.0):
@@ -473,7 +473,9 @@ class Failing:
         self.name, self.sample_time = controller.name, controller.sample_time
         self._controller, self._fails, self._time = controller, fails, 0.0
         solve = controller.qp.solve
-        controller.qp.solve = lambda *asked: replace(solve(*asked), ok=not self._fails(self._time))
+        controller.qp.solve = lambda *asked: replace(
+            solve(*asked), flag=-1 if self._fails(self._time) else 1
+        )
 
     @property
     def status(self):
