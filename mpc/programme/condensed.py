@@ -27,7 +27,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range, pick
+from models.basics import FloatArray, InputError, SolverError, check_range, pick
 
 from .horizon import Horizon, IntArray, Signals
 from .qp import SoftQP
@@ -37,6 +37,7 @@ Question = tuple[FloatArray, FloatArray, FloatArray]
 _OWNER = "programme"
 _QUADRATIC, _LINEAR = 1e4, 1e2  # price of a soft row, over its scale, in units of the cost
 _WIDE = 1e20  # no limit, for the solver
+_FAINT = 1e-6  # of a limit, which the whole cost may move: the solver takes less for nothing
 _NONE = np.zeros(0)
 
 
@@ -101,8 +102,8 @@ class Condensed:
         The Hessian, per unit of a move, (nm, nm); the gradient by the horizon's columns but the
         moves, and by what of zeta at the end of the horizon is no constant.
     rows, at, kind, scale
-        Rows by the horizon's columns, hard ones first, (nr, columns), over their limits; the sample
-        of each, its signal, and one over its limit.
+        Rows by the horizon's columns, hard ones first, (nr, columns), scaled; the sample of each,
+        its signal, and what it is scaled by.
     low, high, row_low, row_high
         Bounds on the moves and on the rows.
     qp
@@ -168,21 +169,37 @@ class Condensed:
         self.from_end = 2.0 * reach.T @ end.N[:, :nz] / self.cost
         self.traced = np.array(trace)
         found.sort(key=lambda one: one[0].soft)  # hard ones first
-        sides, hard = [side for side, _, _ in found], sum(not side.soft for side, _, _ in found)
-        self.at: IntArray = np.array([j for _, j, _ in found], dtype=np.int64)
+        rows = np.array([row for _, _, row in found]).reshape(len(found), moves.stop)
+        # How far the cost of one reaches: rows in units of that, or of their limits where a
+        # violation of one per cent is to cost the same whatever is limited.
+        reach = np.linalg.norm(np.linalg.solve(self._root(), rows[:, moves].T), axis=0)
+        usual = np.array([side.usual for side, _, _ in found], dtype=np.bool_)
+        sizes = np.where(usual, [side.size for side, _, _ in found], reach)
+        kept = np.flatnonzero(reach > np.where(usual, _FAINT * sizes, 0.0)).tolist()
+        sides = [found[k][0] for k in kept]
+        hard = sum(not side.soft for side in sides)
+        self.at: IntArray = np.array([found[k][1] for k in kept], dtype=np.int64)
         self.kind: IntArray = np.array([side.kind for side in sides], dtype=np.int64)
-        self.scale = np.array([1.0 / side.size for side in sides])
-        self.rows = np.array([row for _, _, row in found]).reshape(len(found), moves.stop)
-        self.rows *= self.scale[:, None]
+        self.scale = 1.0 / sizes[kept]
+        self.rows = rows[kept] * self.scale[:, None]
         self.row_low = np.maximum(np.array([side.low for side in sides]) * self.scale, -_WIDE)
         self.row_high = np.minimum(np.array([side.high for side in sides]) * self.scale, _WIDE)
-        links = np.zeros((0, size)) if links is None else links
-        self._hard = np.vstack([links, self.rows[:hard, moves]])
-        self._effort, self._prices = (iterations, time_limit), (_LINEAR, _QUADRATIC)
-        if any(side.price is not None for side in sides[hard:]):
-            own = [side.prices(self.cost) for side in sides[hard:]]
-            self._prices = tuple(np.array(own).T)
+        more = np.zeros((0, size)) if links is None else links
+        self._hard = np.vstack([more, self.rows[:hard, moves]])
+        self._effort = iterations, time_limit
+        self._prices: tuple[float, float] | tuple[FloatArray, FloatArray] = _LINEAR, _QUADRATIC
+        if not usual[kept][hard:].all():
+            priced = zip(sides[hard:], sizes[kept][hard:].tolist(), strict=True)
+            own = np.array([side.prices(self.cost, size) for side, size in priced])
+            self._prices = own[:, 0], own[:, 1]
         self.qp = self.solver(np.ascontiguousarray(self.rows[hard:, moves]))
+
+    def _root(self) -> FloatArray:
+        """Return L of H = L L'."""
+        try:
+            return np.asarray(np.linalg.cholesky(self.H), dtype=np.float64)
+        except np.linalg.LinAlgError as error:
+            raise SolverError(f"{_OWNER}: its Hessian is not positive definite") from error
 
     @cached_property
     def last(self) -> slice:
@@ -256,18 +273,18 @@ class _Side:
         return self.limit.soft is not False
 
     @property
-    def price(self) -> tuple[float, float] | None:
-        """Its own price; None for the usual one."""
-        return None if isinstance(self.limit.soft, bool) else self.limit.soft
+    def usual(self) -> bool:
+        """Whether it has the usual price."""
+        return self.limit.soft is True
 
     @property
     def size(self) -> float:
-        """The larger bound, one where that is zero."""
+        """The larger bound, or one where that is zero."""
         return max(abs(e) for e in (self.low, self.high) if math.isfinite(e)) or 1.0
 
-    def prices(self, cost: float) -> tuple[float, float]:
-        """Return w and W of its row."""
-        if self.price is None:
+    def prices(self, cost: float, size: float) -> tuple[float, float]:
+        """Return w and W of its row in units of a size, a cost being one."""
+        if isinstance(self.limit.soft, bool):
             return _LINEAR, _QUADRATIC
-        linear, square = self.price
-        return linear * self.size / cost, 2.0 * square * self.size**2 / cost
+        linear, square = self.limit.soft
+        return linear * size / cost, 2.0 * square * size**2 / cost

@@ -14,6 +14,7 @@ from sea_predictor import SeaPredictor
 
 import models
 import stillhook as sh
+from models.case import bundled_cases
 from models.operation import scenario_named
 from models.plant import DriveLimits
 from models.sensing import HEARD, Measurement
@@ -24,6 +25,7 @@ from mpc.winch.regulation import feedback_row
 from synth.controllers import VelocityFeedForward
 
 _NAN = float("nan")
+BUNDLED = [name for name, _ in bundled_cases()]
 
 
 def state_of(controller: LinearMPC, rng: np.random.Generator, size: float) -> np.ndarray:
@@ -134,60 +136,46 @@ def test_without_active_limits_it_is_the_linear_quadratic_regulator(name):
         pytest.fail("every state was limited")
 
 
-def test_it_agrees_with_the_plain_statement_in_cvxpy():
-    _compare_with_oracle("thesis-1975", states=60, horizon=1.5)
+@pytest.mark.parametrize("name", BUNDLED)
+def test_it_agrees_with_the_plain_statement_in_cvxpy(name):
+    _compare_with_oracle(name, states=12, horizon=0.6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
+@pytest.mark.ci
+@pytest.mark.parametrize("name", BUNDLED)
 def test_it_agrees_with_the_plain_statement_in_cvxpy_on_a_thousand_states(name):
-    _compare_with_oracle(name, states=1000, horizon=2.0)
-
-
-def programme_cost(qp: SoftQP, question, v: np.ndarray) -> float:
-    f, lower, upper = question
-    n = len(f)
-    value = qp.rows @ v
-    over = np.maximum(np.maximum(value - upper[n:], lower[n:] - value), 0.0)
-    soft = 0.5 * qp.quadratic * over @ over + qp.linear * over.sum()
-    return float(0.5 * v @ qp.H @ v + f @ v + soft)
+    _compare_with_oracle(name, states=1000, horizon=1.0)
 
 
 def _compare_with_oracle(name: str, *, states: int, horizon: float) -> None:
-    controller = controller_of(name, horizon=horizon)
+    """All moves are equal, to 1e-6 of the peak torque, and what has been asked is an optimum.
+
+    States are far off: some violate their limits a thousandfold, at prices that leave the residual
+    of our answer 1e-5 where the moves are right to 1e-7.
+    """
+    weights = WEIGHTS.get(name, WEIGHTS["subsea-crane"])
+    controller = LinearMPC(models.load_case(name), weights=weights, horizon=horizon)
     plain, model = oracle(controller), controller.model
     p, winch = controller.programme, model.winch
     rng = np.random.default_rng(3)
-    active = agreed = unproved = 0
+    active = 0
     ahead = np.linalg.matrix_power(model.A[model.sea_at, model.sea_at], p.steps)
     for _ in range(states):
         chi = state_of(controller, rng, float(rng.choice([0.1, 0.5, 1.0])))
         question, low, high = question_of(controller, chi)
         solved = controller.qp.solve(*question)
-        # 1e-6 is what counts as proved, and where the arithmetic ends for a state this far off
-        # (measured: all on one spring, all but two of a thousand on the crane, those to 2e-6).
-        residual = kkt_residual(controller.qp, *question, solved)
-        unproved += int(residual >= 1e-6)
-        assert residual < 1e-5
         plain.state.value = chi[: winch.size]
         at = model.constants_at.start
         plain.constants.value = chi[at : at + 2]
         plain.path.value = (path_of_sea(model, p.steps) @ chi[model.sea_at]).reshape(-1, 2)
         plain.end.value = ahead @ chi[model.sea_at]
         plain.low.value, plain.high.value = low, high
-        moves = plain.solve()
-        theirs, ours = (programme_cost(controller.qp, question, v) for v in (moves, solved.v))
-        assert ours <= theirs + 1e-8 * (1.0 + abs(theirs))
-        # Where the cost is flat, equal costs to twelve digits leave the move open by some 1e-5.
-        agreed += int(abs(moves[0] - solved.v[0]) < 1e-6)
-        if theirs <= ours + 1e-12 * (1.0 + abs(ours)):
-            assert moves[0] == pytest.approx(solved.v[0], abs=1e-4)
+        moves, residual = plain.solve()
+        assert kkt_residual(controller.qp, *question, solved) < 1e-4
+        assert residual < 1e-9
+        np.testing.assert_allclose(solved.v, moves, rtol=0.0, atol=1e-6)
         active += int((solved.multipliers != 0.0).any())
     assert active > states / 2
-    assert unproved <= (0.0 if name == "thesis-1975" else 0.003) * states
-    # the others: a flat cost, or Clarabel stops short of the optimum at a cost above ours
-    # (measured: all but a few of a thousand on one spring, 936 on the crane)
-    assert agreed >= (0.97 if name == "thesis-1975" else 0.9) * states
 
 
 def test_a_soft_limit_that_costs_more_is_violated_less():

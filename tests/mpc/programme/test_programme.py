@@ -179,14 +179,17 @@ def test_its_rows_are_the_signals_over_their_limits(horizon, regulator, costs, s
     states = motion(horizon, x, path, c, v)
     columns = np.concatenate([x, path.ravel(), c, v.ravel()])
     shown = states @ signals.C.T
-    np.testing.assert_allclose(
-        p.rows @ columns, shown[p.at, p.kind] / np.array([2.0, 4.0])[p.kind], atol=1e-12
-    )
+    np.testing.assert_allclose(p.rows @ columns, shown[p.at, p.kind] * p.scale, rtol=1e-10)
     # Hard ones first; the first sample is past.
     assert p.at.tolist() == [2, 4, 6, 8, 2, 4, 6, 8]
     assert p.kind.tolist() == [1] * 4 + [0] * 4
-    assert p.row_low.tolist() == [-0.125] * 4 + [-1.0] * 4
-    assert p.row_high.tolist() == [1.0] * 4 + [1e20] * 4
+    # Soft ones over their limits; hard ones such that the solver takes none for nothing.
+    assert p.scale[4:].tolist() == [0.5] * 4
+    moved = p.rows[:4, p.horizon.moves]
+    reach = np.einsum("ij,ji->i", moved, np.linalg.solve(p.H, moved.T))
+    np.testing.assert_allclose(reach, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(p.row_low, np.r_[-0.5 * p.scale[:4], [-1.0] * 4], rtol=1e-12)
+    np.testing.assert_allclose(p.row_high, np.r_[4.0 * p.scale[:4], [1e20] * 4], rtol=1e-12)
     np.testing.assert_allclose(p.traced @ columns, states[[0, 1, 3, 5], 0], atol=1e-12)
 
 
