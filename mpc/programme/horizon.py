@@ -144,6 +144,12 @@ def sampled(plant: LinearPlant, period: float) -> tuple[FloatArray, FloatArray, 
     return A, held[:, :nu], from_path
 
 
+def lasting(rows: FloatArray, lasts: FloatArray) -> FloatArray:
+    """Return the columns of a path that lasts as it is now, (., nw), of those of both its ends."""
+    now, later = np.hsplit(rows, 2)
+    return np.asarray(now + later * lasts)
+
+
 def default_blocking(owner: str, horizon: float, sample_time: float) -> tuple[int, ...]:
     """Return lengths of blocks [samples] that grow over a horizon [s]: some thirty moves.
 

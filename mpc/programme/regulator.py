@@ -119,6 +119,12 @@ def unreached(A: FloatArray, B: FloatArray) -> complex | None:
     return None
 
 
+def pole_text(value: complex, period: float) -> str:
+    """Return an eigenvalue of a plant sampled with a period [s] as its pole, in words."""
+    s = np.log(value) / period
+    return f"s = {s.real + 0.0:.3g} 1/s" if abs(s.imag) < 1e-9 else f"s = {s:.3g} 1/s"
+
+
 def _cross(closed: FloatArray, moved: FloatArray, known: FloatArray, Phi: FloatArray) -> FloatArray:
     """Solve N = A_c' (moved + N Phi) + known.
 
