@@ -71,18 +71,19 @@ class Oracle:
         full = P + sp.triu(P, 1).T
         best = x, _residual(full, q, A, b, zero, x, z)
         active = np.concatenate([np.ones(zero, dtype=bool), z[zero:] > s[zero:]])
-        for _ in range(8):
+        for k in range(60):
             x, own = _on_active(full, q, A[active], b[active])
             z = np.zeros(len(b))
             z[active] = own
             residual = _residual(full, q, A, b, zero, x, z)
             if residual < best[1]:
                 best = x, residual
-            wrong = np.where(active, z < -1e-9, A @ x - b > 1e-9)
-            wrong[:zero] = False
-            if not wrong.any():
+            off = np.where(active, -z, A @ x - b)
+            off[:zero] = 0.0
+            if best[1] < 1e-9 or off.max() <= 1e-9:
                 break
-            active = active ^ wrong
+            # All that is wrong at once may go round in circles; one at a time does not.
+            active = active ^ (off > 1e-9 if k < 6 else off >= off.max())
         first = data["param_prob"].var_id_to_col[self.moves.id]
         return best[0][first : first + self.moves.size], best[1]
 
