@@ -45,7 +45,7 @@ class Horizon:
         if controller.window.limits.power < math.inf:
             raise ValueError("peers know no limit on the power")
         self.controller, self.N, self.n = controller, p.steps, model.winch.size
-        winch, products = model.winch, controller.products
+        winch = model.winch
         #: Block of each sample, and the samples at which one begins.
         self.of = np.repeat(np.arange(len(p.blocks)), p.blocks)
         self.starts = np.cumsum((0, *p.blocks[:-1]))
@@ -60,8 +60,8 @@ class Horizon:
         limits = {}
         for k, (j, kind) in enumerate(zip(p.at.tolist(), p.kind.tolist(), strict=True)):
             watched[j, self.kinds.index(kind)] = True
-            scale[kind] = float(products.scale[k])
-            limits[kind] = float(products.low[k]), float(products.high[k])
+            scale[kind] = float(p.scale[k])
+            limits[kind] = float(p.row_low[k]), float(p.row_high[k])
         self.watched, self._scale = watched, scale
         self.low = np.array([limits[k][0] for k in self.kinds])
         self.high = np.array([limits[k][1] for k in self.kinds])
@@ -129,7 +129,7 @@ class Horizon:
         self.after = ca.Function("after", [x, v, f, q], [after])
         self.gap = ca.Function("gap", [x, v, f, q], [gap])
         payload = ca.dot(ca.DM(winch.payload), real)
-        rho = weights.weight * p.unit**2
+        rho = weights.weights[1] * p.unit**2
         cost = (payload**2 + rho * (v - target) ** 2) / p.cost
         self.cost = ca.Function("cost", [x, v, q], [cost])
         self.residuals = ca.Function("residuals", [x, v, q], [ca.vertcat(payload, v - target)])

@@ -33,7 +33,7 @@ from mpc_horizon import Horizon
 
 from mpc.linear import WATCHED
 
-__all__ = ["Peer", "acados_peer", "do_mpc_peer", "ipopt_peer"]
+__all__ = ["Peer", "acados_peer", "acados_solver", "do_mpc_peer", "ipopt_peer"]
 
 FloatArray = npt.NDArray[np.float64]
 _BEYOND = 1e3  # what a limit is moved away by where nobody looks, over the limit
@@ -210,58 +210,46 @@ def do_mpc_peer(horizon: Horizon) -> Peer:
 
 def acados_peer(horizon: Horizon, *, condensed: int = _CONDENSED) -> Peer:
     """Return acados' real-time iteration with HPIPM, generated and compiled."""
-    folder = Path(tempfile.mkdtemp(prefix="acados-"))
-    _lay_out(folder / "acados")
-    from acados.acados_template import AcadosOcp, AcadosOcpSolver
-
     h = horizon
     if len(h.starts) < h.N:
         raise ValueError("acados gets a move for every sample")
     if h.forces:
         raise ValueError("forces that depend on themselves are no explicit step for acados")
     N, n, nk = h.N, h.n, len(h.kinds)
-    ocp: Any = AcadosOcp()
     x, v = ca.SX.sym("x", n), ca.SX.sym("v")
     q = ca.SX.sym("q", h.count + n)
     here, end = q[: h.count], q[h.count :]
     none = ca.SX(0, 1)
-    ocp.model.name, ocp.model.x, ocp.model.u, ocp.model.p = "winch", x, v, q
-    ocp.model.disc_dyn_expr = h.after(x, v, none, here)
-    ocp.parameter_values = np.zeros(h.count + n)
-    o, c = ocp.solver_options, ocp.constraints
-    ocp.dims.N, o.tf = N, float(N)  # so that stages weigh one
-    ocp.cost.cost_type = "NONLINEAR_LS"
-    ocp.model.cost_y_expr = h.residuals(x, v, here)
-    ocp.cost.W = np.diag(2.0 * h.weights)
-    ocp.cost.yref = np.zeros(2)
-    ocp.cost.cost_type_e = "EXTERNAL"
-    ocp.model.cost_expr_ext_cost_e = h.end_cost(x, end)
     rows = h.rows(x, v, here)
     states = [k for k, kind in enumerate(h.kinds) if WATCHED[kind] != "command"]
-    ocp.model.con_h_expr = rows
-    ocp.model.con_h_expr_e = h.rows(x, 0, here)[states]
-    for tail, of in (("", list(range(nk))), ("_e", states)):
-        many = len(of)
-        setattr(c, f"lh{tail}", np.maximum(h.low[of], -_BEYOND))
-        setattr(c, f"uh{tail}", np.minimum(h.high[of], _BEYOND))
-        setattr(c, f"idxsh{tail}", np.arange(many))
-        for side in "lu":
-            setattr(ocp.cost, f"z{side}{tail}", np.full(many, h.linear_price))
-            setattr(ocp.cost, f"Z{side}{tail}", np.full(many, h.quadratic_price))
-    c.lbu, c.ubu, c.idxbu = np.array([-9.0]), np.array([9.0]), np.array([0])
-    c.x0 = np.zeros(n)
-    o.integrator_type, o.nlp_solver_type = "DISCRETE", "SQP_RTI"
-    o.qp_solver, o.qp_solver_cond_N = "PARTIAL_CONDENSING_HPIPM", condensed
-    o.hessian_approx, o.hpipm_mode = "GAUSS_NEWTON", "BALANCE"
-    o.qp_solver_warm_start, o.print_level = (
-        0,
-        0,
-    )  # HPIPM, an interior-point method, goes astray warm
-    o.qp_solver_iter_max, o.qp_tol = 100, 1e-9
-    ocp.code_export_directory = str(folder / "code")
-    with _within(folder), contextlib.redirect_stdout(io.StringIO()):
-        solver: Any = AcadosOcpSolver(ocp, json_file=str(folder / "ocp.json"), verbose=False)
-    shutil.rmtree(folder)  # it is loaded
+
+    def state(ocp: Any) -> None:
+        ocp.model.name, ocp.model.x, ocp.model.u, ocp.model.p = "winch", x, v, q
+        ocp.model.disc_dyn_expr = h.after(x, v, none, here)
+        ocp.parameter_values = np.zeros(h.count + n)
+        o, c = ocp.solver_options, ocp.constraints
+        ocp.dims.N, o.tf = N, float(N)  # so that stages weigh one
+        ocp.cost.cost_type = "NONLINEAR_LS"
+        ocp.model.cost_y_expr = h.residuals(x, v, here)
+        ocp.cost.W = np.diag(2.0 * h.weights)
+        ocp.cost.yref = np.zeros(2)
+        ocp.cost.cost_type_e = "EXTERNAL"
+        ocp.model.cost_expr_ext_cost_e = h.end_cost(x, end)
+        ocp.model.con_h_expr = rows
+        ocp.model.con_h_expr_e = h.rows(x, 0, here)[states]
+        for tail, of in (("", list(range(nk))), ("_e", states)):
+            many = len(of)
+            setattr(c, f"lh{tail}", np.maximum(h.low[of], -_BEYOND))
+            setattr(c, f"uh{tail}", np.minimum(h.high[of], _BEYOND))
+            setattr(c, f"idxsh{tail}", np.arange(many))
+            for side in "lu":
+                setattr(ocp.cost, f"z{side}{tail}", np.full(many, h.linear_price))
+                setattr(ocp.cost, f"Z{side}{tail}", np.full(many, h.quadratic_price))
+        c.lbu, c.ubu, c.idxbu = np.array([-9.0]), np.array([9.0]), np.array([0])
+        c.x0 = np.zeros(n)
+        o.nlp_solver_type, o.qp_solver_cond_N = "SQP_RTI", condensed
+
+    solver = acados_solver(state)
     for j in range(N + 1):
         of = states if j == N else list(range(nk))
         seen = h.watched[j, of]
@@ -269,7 +257,7 @@ def acados_peer(horizon: Horizon, *, condensed: int = _CONDENSED) -> Peer:
         solver.constraints_set(j, "uh", np.where(seen, np.minimum(h.high[of], _BEYOND), _BEYOND))
     given = np.zeros((N + 1, h.count + n))
     # Its Python's `set` checks every stage's array: that alone would take longer than the solver.
-    update = getattr(solver.shared_lib, f"{ocp.model.name}_acados_update_params")
+    update = solver.shared_lib.winch_acados_update_params
     update.argtypes = [
         *(ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(ctypes.c_double), ctypes.c_int)
     ]
@@ -294,6 +282,26 @@ def acados_peer(horizon: Horizon, *, condensed: int = _CONDENSED) -> Peer:
         return float(solver.get(0, "u")[0]) if status in (0, 5) else math.nan
 
     return Peer(give=give, solve=solve)
+
+
+def acados_solver(state: Callable[[Any], None]) -> Any:
+    """Return acados' solver of a problem, which is stated into an `AcadosOcp`; HPIPM, discrete."""
+    folder = Path(tempfile.mkdtemp(prefix="acados-"))
+    _lay_out(folder / "acados")
+    from acados.acados_template import AcadosOcp, AcadosOcpSolver
+
+    ocp: Any = AcadosOcp()
+    o = ocp.solver_options
+    o.integrator_type, o.qp_solver = "DISCRETE", "PARTIAL_CONDENSING_HPIPM"
+    o.hessian_approx, o.hpipm_mode, o.print_level = "GAUSS_NEWTON", "BALANCE", 0
+    o.qp_solver_warm_start = 0  # HPIPM, an interior-point method, goes astray warm
+    o.qp_solver_iter_max, o.qp_tol = 100, 1e-9
+    state(ocp)
+    ocp.code_export_directory = str(folder / "code")
+    with _within(folder), contextlib.redirect_stdout(io.StringIO()):
+        solver = AcadosOcpSolver(ocp, json_file=str(folder / "ocp.json"), verbose=False)
+    shutil.rmtree(folder)  # it is loaded
+    return solver
 
 
 def _lay_out(root: Path) -> None:

@@ -101,8 +101,8 @@ def slack_statement(recording: Recording) -> Programme:
 
 def _sides(recording: Recording) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Return which rows are bounded from above, and which from below."""
-    products = recording.controller.products
-    return products.high < 1e19, products.low > -1e19
+    p = recording.controller.programme
+    return p.row_high < 1e19, p.row_low > -1e19
 
 
 class _Stages:
@@ -143,7 +143,7 @@ def stage_statement(recording: Recording) -> Programme:
     over, under = _sides(recording)
     P = sp.lil_matrix((size, size))
     A = sp.lil_matrix(((N + 1) * s.nx, size))
-    payload, rho = winch.payload * unit, 2.0 * weights.weight * p.unit**2 / p.cost
+    payload, rho = winch.payload * unit, 2.0 * weights.weights[1] * p.unit**2 / p.cost
     for j in range(N + 1):
         x = slice(int(s.at[j]), int(s.at[j]) + n)
         if 0 < j < N:
@@ -174,7 +174,7 @@ def stage_statement(recording: Recording) -> Programme:
                     row = np.zeros(size)
                     row[int(s.at[j]) : int(s.at[j]) + n] = _watched(controller, k) * unit
                     if WATCHED[p.kind[k]] == "command":
-                        row[s.move(j)] = controller.products.scale[k] * p.unit / winch.gain
+                        row[s.move(j)] = controller.programme.scale[k] * p.unit / winch.gain
                     row[s.slack(j, i)] = way
                     entries.append((k, row, int(way)))
     kind = np.zeros((N + 1, 3), dtype=np.int64)
@@ -197,7 +197,7 @@ def _watched(controller: LinearMPC, k: int) -> FloatArray:
     name = WATCHED[p.kind[k]]
     of: Any = {"speed": winch.speed, "tension": winch.tension, "payload": winch.payload}
     row = winch.back * winch.speed if name == "command" else of[name]
-    return np.asarray(controller.products.scale[k] * row)
+    return np.asarray(controller.programme.scale[k] * row)
 
 
 def _stage_vectors(
@@ -206,7 +206,7 @@ def _stage_vectors(
     """Return the vectors of each sample, made of the estimate alone."""
     controller = recording.controller
     p, model, weights = controller.programme, controller.model, controller.regulator
-    winch, products, qp = model.winch, controller.products, controller.qp
+    winch, qp = model.winch, controller.qp
     N, n, nh, size = s.N, s.n, model.sea.order, int(s.at[-1])
     to_path = path_of_sea(model, N)
     ahead = np.linalg.matrix_power(model.A[model.sea_at, model.sea_at], N)
@@ -226,13 +226,13 @@ def _stage_vectors(
         path = (to_path @ chi[model.sea_at]).reshape(N + 1, 2)
         q, b = np.zeros(size), np.zeros((N + 1, s.nx))
         q[slack] = qp.linear
-        q[moves] = -2.0 * weights.weight * p.unit / p.cost * float(winch.steady @ c)
+        q[moves] = -2.0 * weights.weights[1] * p.unit / p.cost * float(winch.steady @ c)
         end = weights.N[:, :nh] @ (ahead @ chi[model.sea_at]) + weights.N[:, nh:] @ c
         q[last] = 2.0 * s.unit * end / p.cost
         b[0, :n] = chi[:n] / s.unit
         ends = np.hstack([path[:-1], path[1:]])
         b[1:, :n] = -(ends @ winch.from_hook.T + winch.from_constants @ c) / s.unit
-        more = products.scale[rows] * (path[p.at[rows]] @ winch.tension_from_hook + shift)
+        more = p.scale[rows] * (path[p.at[rows]] @ winch.tension_from_hook + shift)
         more = np.where(tension, more, 0.0)
         least, most = np.full(size, -math.inf), np.full(size, math.inf)
         least[slack] = 0.0
@@ -241,8 +241,8 @@ def _stage_vectors(
             Vectors(
                 q,
                 b.ravel(),
-                np.where(above, -math.inf, products.low[rows] - more),
-                np.where(above, products.high[rows] - more, math.inf),
+                np.where(above, -math.inf, p.row_low[rows] - more),
+                np.where(above, p.row_high[rows] - more, math.inf),
                 least,
                 most,
             )

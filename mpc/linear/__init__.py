@@ -14,6 +14,6 @@ if TYPE_CHECKING:
     from .linear import LinearMPC
     from .products import Products
     from .winch_mpc import WinchMPC, WinchOptions
-    from .winch_programme import WATCHED, by_chi, path_of_sea, sea_at_end
+    from .winch_programme import WATCHED, by_chi, path_of_sea, sea_at_end, winch_signals
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -9,9 +9,9 @@ has the one and not the other.
 import numpy as np
 from typing_extensions import Unpack, override
 
-from models.basics import FloatArray
 from models.case import Case
 
+from ..programme import Question
 from .linear import LinearMPC
 from .winch_mpc import WinchOptions
 
@@ -25,13 +25,10 @@ class ClippedMPC(LinearMPC):
 
     def __init__(self, case: Case, **options: Unpack[WinchOptions]) -> None:
         super().__init__(case, **({"name": "mpc-clipped"} | options))
-        first = np.linalg.inv(np.asarray(self.programme.H))[0]
-        self._law = -first
+        self._law = self.programme.law[0]
 
     @override
-    def _solve(
-        self, question: tuple[FloatArray, FloatArray, FloatArray], began: float
-    ) -> float | None:
+    def _solve(self, question: Question, began: float) -> float | None:
         """Return the first move of the answer without limits, within those of the drive."""
         del began
         gradient, lower, upper = question

@@ -136,12 +136,10 @@ class LinearMPC(WinchMPC):
                 open_low=True,
             )
         super().__init__(case, **options)
-        self.programme = p = self._condense(self.model)
-        self.products = self._products(self.model, p)
-        free = np.eye(len(p.blocks))
-        self.qp = self._solver(
-            self.products.rows, None if torque_rate is None else free[1:] - free[:-1]
-        )
+        free = np.eye(len(self._blocks))
+        links = None if torque_rate is None else free[1:] - free[:-1]
+        self.programme = p = self._condense(self.model, links=links)
+        self.products, self.qp = self._products(self.model, p), p.qp
         self._lengths = np.array(p.blocks[:-1], dtype=np.float64)
         # Change of torque from each move to the next, and over one sample.
         self._at_most = math.inf if torque_rate is None else torque_rate * self.sample_time
@@ -184,7 +182,7 @@ class LinearMPC(WinchMPC):
             )
         # The bounds at speeds of the last plan make a convex programme of one that is not: torque
         # times speed is limited, and the plan changes little from sample to sample.
-        question = products.question(gradient, free, low, high, self._rates)
+        question = self.programme.question(gradient, free, low, high, self._rates)
         move = self._solve(question, began)
         if self.solved is not None:
             self._speeds = products.speeds(chi, self.solved.v)

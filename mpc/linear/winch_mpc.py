@@ -36,7 +36,15 @@ from models.plant import SPEED_BAND, DriveLimits, late_hold
 from models.sensing import HEARD, Controller, Measurement
 
 from ..forecast import AdaptiveAR, Forecast, PerfectPreview, Predictor, SeaBank, fused
-from ..programme import Condensed, QPSolution, SoftQP, default_blocking, kkt_residual
+from ..programme import (
+    Condensed,
+    QPSolution,
+    Question,
+    Signals,
+    SoftQP,
+    default_blocking,
+    kkt_residual,
+)
 from ..winch import (
     PredictionModel,
     SampledWinch,
@@ -54,7 +62,6 @@ from .products import Products
 from .winch_programme import winch_programme
 
 _OWNER = "predictive control"
-_QUADRATIC, _LINEAR = 1e4, 1e2  # price of a soft row, over its scale, in units of the cost
 _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own overspeed cut
 _HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
 _PROVED = 1e-6  # residual of the optimality conditions
@@ -258,7 +265,7 @@ class WinchMPC(ABC):
         self._counts = dict.fromkeys(
             ("steps", "iterations", "late", "unproved", "gated", "blind", "misfit", "fallback"), 0
         )
-        self.question: tuple[FloatArray, FloatArray, FloatArray] | None = None
+        self.question: Question | None = None
         self.solved: QPSolution | None = None
         self._answered = True  # whether the last step had its command of the programme
 
@@ -266,25 +273,25 @@ class WinchMPC(ABC):
     def step(self, measurement: Measurement, time: float) -> float:
         """Return the drive command, its static part included [V, rad/s or N m]."""
 
-    def _condense(self, model: PredictionModel) -> Condensed:
+    def _condense(
+        self,
+        model: PredictionModel,
+        signals: Signals | None = None,
+        links: FloatArray | None = None,
+    ) -> Condensed:
         """Return the programme of the controller's cost, blocks and limits on a model."""
-        return winch_programme(model, self.regulator, self._blocks, tuple(self.soft_limits))
-
-    def _products(self, model: PredictionModel, programme: Condensed) -> Products:
-        return Products.of(
-            model, programme, self.soft_limits, self._sea_covariance, self.estimator.model
-        )
-
-    def _solver(self, rows: FloatArray, hard: FloatArray | None = None) -> SoftQP:
-        """Return the solver of the programme with scaled soft rows and with hard ones."""
-        return SoftQP(
-            self.programme.H,
-            rows,
-            quadratic=_QUADRATIC,
-            linear=_LINEAR,
-            hard=hard,
+        return winch_programme(
+            model,
+            self.regulator,
+            self._blocks,
+            self.soft_limits,
+            signals,
+            links=links,
             time_limit=0.0 if self._deadline == math.inf else self._deadline,
         )
+
+    def _products(self, model: PredictionModel, programme: Condensed) -> Products:
+        return Products.of(model, programme, self._sea_covariance, self.estimator.model)
 
     def _forecast(self, shown: FloatArray, time: float) -> Forecast | None:
         """Return the predictor's forecast, None where the hook moves as the estimator's sea."""
@@ -322,9 +329,7 @@ class WinchMPC(ABC):
         # Over a sample the torque falls or rises with the speed: the larger end counts.
         return self._budget.update(max(abs(float(shown[_TORQUE])), abs(self._asked)))
 
-    def _solve(
-        self, question: tuple[FloatArray, FloatArray, FloatArray], began: float
-    ) -> float | None:
+    def _solve(self, question: Question, began: float) -> float | None:
         """Return the first move of the answer, None if there is none that is good."""
         self.question, self.solved, self._answered = question, None, False
         # The estimate is finite (`WinchEstimator`): it is the forecast that is not.

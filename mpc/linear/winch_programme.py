@@ -1,6 +1,6 @@
 r"""The condensed programme of the winch: its horizon, limited signals, and the sea beyond.
 
-    PredictionModel, LQRegulator, blocks --> Horizon --> `mpc.programme.condensed` --> Condensed
+    PredictionModel, LQRegulator, blocks, limits --> `mpc.programme.condensed`
 
 The moves are torques in units of the peak, the path is displacement and velocity of the hook
 (z_0, z'_0, z_1, z'_1, ...), the cost is that of the payload over the hook's rms, and the constants
@@ -9,14 +9,23 @@ model says: its state there is either as the filter expects it or as the path to
 likely (`sea_at_end`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from models.basics import FloatArray
 
-from ..programme import Condensed, Horizon, LQRegulator, condense, end_of_record, free_outputs
-from ..winch import PredictionModel
+from ..programme import (
+    Condensed,
+    Constraint,
+    Horizon,
+    LQRegulator,
+    Signals,
+    end_of_record,
+    free_outputs,
+)
+from ..winch import PredictionModel, SampledWinch
 
 #: What may be limited: motor speed [rad/s], tension at the payload [N], payload [m], and the
 #: command's deviation from rest [unit of the command].
@@ -28,39 +37,64 @@ def winch_programme(
     model: PredictionModel,
     regulator: LQRegulator,
     blocks: Sequence[int],
-    watch: Sequence[str] = ("speed", "tension"),
+    limits: Mapping[str, tuple[float, float]],
+    signals: Signals | None = None,
+    **solver: Any,
 ) -> Condensed:
-    """Return the matrices of the programme, with blocks of so many samples (nb,).
+    """Return the programme, with blocks of so many samples (nb,).
 
-    The regulator's value function ends the horizon; signals of `WATCHED` get rows.
+    The regulator's value function ends the horizon; signals of `WATCHED` have soft limits, as
+    deviations from rest.  They are by default those of the winch, and what is left goes to the
+    `solver` (`Condensed`).
     """
-    winch = model.winch
-    horizon = Horizon(
-        A=winch.A,
-        B=winch.B,
-        from_path=winch.from_hook,
-        from_constants=winch.from_constants,
-        blocks=tuple(blocks),
-        unit=winch.case.winch.drive.torque_peak,
+    winch, unit = model.winch, model.winch.case.winch.drive.torque_peak
+    held = np.zeros((2, 2))
+    held[1] = -winch.steady
+    watched = _watched(sum(blocks))
+    return Condensed(
+        Horizon(
+            A=winch.A,
+            B=winch.B,
+            from_path=winch.from_hook,
+            from_constants=winch.from_constants,
+            blocks=tuple(blocks),
+            units=np.array([unit]),
+        ),
+        signals=winch_signals(winch) if signals is None else signals,
+        cost=Signals(
+            names=("payload", "torque"),
+            C=np.vstack([winch.payload, np.zeros(winch.size)]),
+            D=np.array([[0.0], [1.0]]),
+            F=np.zeros((2, 4)),
+            G=held,
+        ),
+        end=regulator,
+        constraints=[
+            Constraint(
+                signal=name, low=limits[name][0], high=limits[name][1], soft=True, samples=watched
+            )
+            for name in WATCHED
+            if name in limits
+        ],
+        inputs=("torque",),
+        rest={},
+        scale=sum(blocks) * model.waves[0] ** 2,
+        traced="reckoned",
+        **solver,
     )
-    watched = _watched(horizon.steps)
 
-    def signals(j: int, S: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-        """Give the signals that are limited at sample j."""
-        if j not in watched:
-            return
-        for name, row in _rows(model, horizon, j, S):
-            # At the first sample only the command is still open.
-            if name in watch and (j > 0 or name == "command"):
-                yield WATCHED.index(name), row
 
-    return condense(
-        horizon,
-        regulator,
-        output=winch.payload,
-        scale=model.waves[0] ** 2,
-        speed=winch.reckoned,
-        signals=signals,
+def winch_signals(winch: SampledWinch) -> Signals:
+    """Return what may be limited, `WATCHED`, and the speed that a command reckons with."""
+    C = np.array([winch.speed, winch.tension, winch.payload, winch.back * winch.reckoned])
+    F, G = np.zeros((5, 4)), np.zeros((5, 2))
+    F[1, :2], G[1] = winch.tension_from_hook, winch.tension_from_constants
+    return Signals(
+        names=(*WATCHED, "reckoned"),
+        C=np.vstack([C, winch.reckoned]),
+        D=np.array([[0.0], [0.0], [0.0], [1.0 / winch.gain], [0.0]]),
+        F=F,
+        G=G,
     )
 
 
@@ -96,27 +130,10 @@ def sea_at_end(
     return end_of_record(model.A[at, at], model.hook[:, at], added, R, covariance, steps)
 
 
-def _watched(N: int) -> set[int]:
+def _watched(N: int) -> frozenset[int]:
     """Return the samples at which limits on the state are kept: dense at first, then rarer."""
     found, j = {0, N}, 1.0
     while j < N:
         found.add(round(j))
         j = max(j + 2.0, 1.12 * j)
-    return found
-
-
-def _rows(
-    model: PredictionModel, horizon: Horizon, j: int, S: FloatArray
-) -> list[tuple[str, FloatArray]]:
-    """Return the signals that may be limited, at sample j, by the horizon's columns."""
-    winch = model.winch
-    speed, tension = winch.speed @ S, winch.tension @ S
-    here = horizon.ends(j).start
-    tension[here : here + 2] += winch.tension_from_hook
-    tension[horizon.constants] += winch.tension_from_constants
-    found = [("speed", speed), ("tension", tension), ("payload", winch.payload @ S)]
-    if j < horizon.steps:
-        command = winch.back * (winch.reckoned @ S)
-        command[horizon.move(j)] += horizon.unit / winch.gain
-        found.append(("command", command))
-    return found
+    return frozenset(found)

@@ -20,7 +20,7 @@ from models.case import Case
 from models.plant import DrumTravel
 from models.sensing import HEARD, Measurement
 
-from ..linear import WinchMPC, WinchOptions, path_of_sea
+from ..linear import WinchMPC, WinchOptions, path_of_sea, winch_signals
 from .mean_torque import start_torque
 from .responses import with_drift
 from .shooting import Known, Linearisation, Shooting
@@ -126,9 +126,8 @@ class NonlinearMPC(WinchMPC):
         model = self.model
         if mean_torque:
             model = replace(model, winch=self.stage.winch)
-        self.programme = p = self._condense(model)
-        if mean_torque:
-            self.programme = p = with_drift(p, self.stage)
+        signals = with_drift(winch_signals(winch), self.stage)
+        self.programme = p = self._condense(model, signals)
         self.products = products = self._products(model, p)
         self.shooting = Shooting(
             model,
@@ -140,17 +139,17 @@ class NonlinearMPC(WinchMPC):
             self.estimator.model,
         )
         powers = len(p.blocks) - 1 if self.window.narrows else 0
-        self._low = np.concatenate([products.low, -np.ones(powers)])
-        self._high = np.concatenate([products.high, np.ones(powers)])
+        self._low = np.concatenate([p.row_low, -np.ones(powers)])
+        self._high = np.concatenate([p.row_high, np.ones(powers)])
         self._ends = path_of_sea(self.model, 1)
         self._starts = np.array(p.horizon.starts, dtype=np.float64)
-        self._rows = np.vstack([products.rows, np.zeros((powers, len(p.blocks)))])
+        self._rows = np.vstack([p.qp.rows, np.zeros((powers, len(p.blocks)))])
         # Where a plan has left all sense, its slopes are not to be trusted with the solver.
         reach = [_reach(name, self.model.winch.rest_tension) for name in self.stage.arguments]
         span = np.tile(reach, self.shooting.nodes)
         self._sane = self.shooting.rest - span, self.shooting.rest + span
         self._resting = self.shooting.linearise(np.array(self.shooting.rest))
-        self.qp = self._solver(self._rows)
+        self.qp = p.solver(self._rows)
         self.reset()
 
     @override
@@ -318,7 +317,7 @@ class NonlinearMPC(WinchMPC):
         """Give the linearisation to the solver; return whether it takes it."""
         p, S = self.programme, self._prepared.outputs
         rows = np.empty_like(self.qp.rows)
-        count = len(self.products.rows)
+        count = len(p.at)
         rows[:count] = S[self.shooting.rows]
         if len(rows) > count:
             # (tau_0 + d) omega is a product of two things that the moves change: linearised at the

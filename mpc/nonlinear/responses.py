@@ -12,22 +12,19 @@ import numpy as np
 from models.basics import FloatArray
 
 from ..linear import WATCHED
-from ..programme import Condensed
+from ..programme import Condensed, Signals
 from .stage import Stage
 
 
-def with_drift(p: Condensed, stage: Stage) -> Condensed:
-    """Return the programme with the command at the start of a sample, though moves are means."""
-    drift, horizon = stage.drift, p.horizon
-    rows = np.array(p.rows)
-    for j, S in zip(range(p.steps), horizon.states(), strict=False):
-        over = drift.state @ S
-        over[horizon.ends(j)] += drift.hook
-        over[horizon.constants] += drift.constants
-        over[horizon.move(j)] += drift.mean * p.unit
-        for k in np.flatnonzero((p.at == j) & (p.kind == WATCHED.index("command"))):
-            rows[k] += over / stage.winch.gain
-    return replace(p, rows=rows)
+def with_drift(signals: Signals, stage: Stage) -> Signals:
+    """Return the signals with the command at the start of a sample, though moves are means."""
+    drift, k = stage.drift, signals.names.index("command")
+    C, D, F, G = (np.array(part) for part in (signals.C, signals.D, signals.F, signals.G))
+    for part, over in (
+        (C, drift.state), (D, drift.mean), (F, drift.hook), (G, drift.constants)
+    ):  # fmt: skip
+        part[k] += over / stage.winch.gain
+    return replace(signals, C=C, D=D, F=F, G=G)
 
 
 def linear_response(p: Condensed, stage: Stage) -> tuple[FloatArray, FloatArray]:
@@ -43,9 +40,9 @@ def linear_response(p: Condensed, stage: Stage) -> tuple[FloatArray, FloatArray]
         at = stage.C @ S
         at[:, horizon.ends(j)] += stage.C_hook
         at[:, horizon.constants] += stage.C_constants
-        at[:, horizon.move(j)] += stage.D * p.unit
+        at[:, horizon.move(j)] += stage.D[:, None] * p.unit
         y.append(at)
-    return np.vstack(y), np.vstack([*o, p.speeds])
+    return np.vstack(y), np.vstack([*o, p.traced])
 
 
 def forced_response(p: Condensed, stage: Stage, scale: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -23,7 +23,7 @@ not grow with the masses of the rope.  J is block diagonal, G block lower triang
 force acts on what comes after it.
 
 The cost is a sum of squares, so that its Gauss-Newton Hessian is that of the linearised
-outputs; with the forces' slope zero, all is that of `mpc.programme.condensed`.
+outputs; with the forces' slope zero, all is that of `mpc.programme.horizon`.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Shooting:
     programme
         The linear programme, whose blocks and units are taken over.
     products
-        Its products, whose rows and limits are taken over, scaled as they are.
+        Its products, whose rows are taken over.
     stage
         One sample.
     covariance
@@ -123,7 +123,7 @@ class Shooting:
         self.payload, self.end, self.speeds, self.rows = parts
         self.rest = read_only(np.tile(stage.rest, self.nodes))
         y, o = linear_response(p, stage)
-        G, Theta = forced_response(p, stage, products.scale)
+        G, Theta = forced_response(p, stage, p.scale)
 
         # What is known comes as chi, and as a path if that is not of chi's own sea.
         path = p.horizon.path
@@ -142,7 +142,7 @@ class Shooting:
         beyond[:, model.sea_at] = weights.N[:, :nh] @ ahead
         weight = np.zeros((nb, size))
         lengths = np.array(p.blocks, dtype=np.float64)
-        weight[:, of] = -weights.weight * p.unit * np.outer(lengths, winch.steady)
+        weight[:, of] = -weights.weights[1] * p.unit * np.outer(lengths, winch.steady)
         rows = products.matrix[products.size + products.moves :]
         self._matrix = np.ascontiguousarray(np.vstack([believed.A, chi, rows, beyond, weight]))
         self._parts = np.cumsum([size, len(y), len(o) + nr, n])
@@ -152,7 +152,7 @@ class Shooting:
         self._relative = np.vstack([o[:, :n] @ winch.moved, products.moved_free])
         self._relative[self.speeds] = 0.0
 
-        self._Y, self._O = y[:, -nb:].copy(), np.vstack([o[:, -nb:], products.rows])
+        self._Y, self._O = y[:, -nb:].copy(), np.vstack([o[:, -nb:], p.qp.rows])
         self._G, self._Theta = G, Theta
         # Forces that always have a slope, and those of slack springs, which seldom do.
         slack = [name.startswith("slack.") for name in stage.channels]
@@ -170,7 +170,7 @@ class Shooting:
         }
         self._Y_by = {a: np.ascontiguousarray(self._Y[a :: self._my]) for a in range(self._my)}
         self._P = weights.P
-        self._bend = np.diag(2.0 * weights.weight * p.unit**2 * lengths / p.cost)
+        self._bend = np.diag(2.0 * weights.weights[1] * p.unit**2 * lengths / p.cost)
 
     def known(self, chi: FloatArray) -> tuple[FloatArray, Known]:
         """Return A chi, and what chi tells of the horizon."""

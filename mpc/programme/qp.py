@@ -24,16 +24,27 @@ import numpy as np
 from models.basics import FloatArray, SolverError
 
 _SOFT = 8  # DAQP's bit of a soft row
+_INFEASIBLE = -1  # and its exit flag
 
 
 @dataclass(frozen=True, slots=True)
 class QPSolution:
-    """An answer: moves v (n,), a multiplier for each bound, iterations, and whether it is one."""
+    """An answer: moves v (n,), a multiplier for each bound, iterations, and DAQP's exit flag."""
 
     v: FloatArray
     multipliers: FloatArray
     iterations: int
-    ok: bool
+    flag: int
+
+    @property
+    def ok(self) -> bool:
+        """Whether it is one."""
+        return self.flag > 0
+
+    @property
+    def infeasible(self) -> bool:
+        """Whether there can be none, as hard rows exclude each other."""
+        return self.flag == _INFEASIBLE
 
 
 class SoftQP:
@@ -46,9 +57,9 @@ class SoftQP:
     rows
         R, (m, n), scaled so that its values are of the size of one.
     hard
-        S, (h, n), rows that may not be violated; there is always a v that does not.
+        S, (h, n), rows that may not be violated.
     quadratic, linear
-        W and w of the soft rows.
+        W and w of the soft rows: a number for all, or one for each, (m,).
     iterations
         How many are allowed.
     time_limit
@@ -65,8 +76,8 @@ class SoftQP:
         H: FloatArray,
         rows: FloatArray,
         *,
-        quadratic: float,
-        linear: float,
+        quadratic: float | FloatArray,
+        linear: float | FloatArray,
         hard: FloatArray | None = None,
         iterations: int = 400,
         time_limit: float = 0.0,
@@ -101,8 +112,9 @@ class SoftQP:
             "eps_prox": 0.0,
             "primal_tol": 1e-9,
         }
-        rho = np.full(len(self._wide), 1.0 / self.quadratic)
-        w = np.full(len(self._wide), self.linear)
+        rho, w = np.ones(len(self._wide)), np.ones(len(self._wide))
+        soft = slice(n + len(self.hard), None)
+        rho[soft], w[soft] = 1.0 / self.quadratic, self.linear
         model.soft_weights(rho, rho, w, w)
         self._model = model
 
@@ -130,7 +142,7 @@ class SoftQP:
         """Solve for a gradient (n,) and bounds on moves, hard and soft rows, finite or +-1e20."""
         self._model.update(f=f, bupper=upper, blower=lower)
         v, _, flag, info = self._model.solve()
-        return QPSolution(v, info["lam"], info["iterations"], flag > 0)
+        return QPSolution(v, info["lam"], info["iterations"], flag)
 
 
 def kkt_residual(

@@ -28,25 +28,28 @@ def regulator(model: PredictionModel, weight: float) -> LQRegulator:
     scale = np.maximum(np.abs(winch.moved).max(axis=1), 1e-9)
     scale[scale == 1e-9] = 1.0
     scale[winch.size - winch.waiting :] = winch.case.winch.drive.torque_peak / winch.gain
+    at_rest = np.zeros((2, nh + 2))  # the payload's place, and the input that holds it there
+    at_rest[1, nh:] = -winch.steady
     return lq_regulator(
         np.asarray(winch.A),
         np.asarray(winch.B),
-        winch.payload,
-        weight=rho,
+        np.vstack([winch.payload, np.zeros(winch.size)]),
+        np.array([[0.0], [1.0]]),
+        weights=np.array([1.0, rho]),
         scale=scale,
         Gamma=np.hstack([model.A[: winch.size, model.sea_at], winch.from_constants]),
         Phi=scipy.linalg.block_diag(model.A[model.sea_at, model.sea_at], np.eye(2)),
-        steady=np.concatenate([np.zeros(nh), winch.steady]),
+        M=at_rest,
     )
 
 
 def feedback_row(regulator: LQRegulator, model: PredictionModel) -> FloatArray:
     """Return the row F of d = -F chi, (n,)."""
     row = np.zeros(model.size)
-    row[: model.winch.size] = regulator.K
-    row[model.sea_at] = regulator.K_disturbance[: model.sea.order]
+    row[: model.winch.size] = regulator.K[0]
+    row[model.sea_at] = regulator.K_disturbance[0, : model.sea.order]
     at = model.constants_at.start
-    row[at : at + 2] = regulator.K_disturbance[model.sea.order :]
+    row[at : at + 2] = regulator.K_disturbance[0, model.sea.order :]
     return row
 
 

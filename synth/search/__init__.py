@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .multistart import Found, Progress, Start, least_violation, search, with_bests
     from .nodes import cost_nodes, glanced, margin_nodes
     from .polishing import KEPT, assess, polish, settle, stated
-    from .programme import Programme, Solution
+    from .programme import GainProgramme, Solution
     from .starts import begin_points, briskest, hardest, start_coefficients
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -16,7 +16,7 @@ from ..limits import Limit
 from ..loop import Assessment, Coefficients
 from ..question import FamilyProblem, Goal, Problem, Values
 from .nodes import cost_nodes, glanced, margin_nodes
-from .programme import Programme, Solution
+from .programme import GainProgramme, Solution
 from .sqp import INFEASIBLE
 
 KEPT = 1e-5  # relative excess over a limit that counts as none
@@ -40,12 +40,12 @@ def stated(
     rough: bool = False,
     fine: bool = False,
     exact: bool = False,
-) -> Programme:
+) -> GainProgramme:
     """Return a programme of a family on nodes that suit the loops at a point.
 
     The point is one of searched parameters, and of coefficients of elements.  Goal, reference and
-    relaxed limits are as `Programme` takes them.  The nodes are for three digits if `rough`, for
-    eight if `fine`; if `exact`, margins are held where they are measured.
+    relaxed limits are as `GainProgramme` takes them.  The nodes are for three digits if `rough`,
+    for eight if `fine`; if `exact`, margins are held where they are measured.
     """
     family = FamilyProblem.of(asked)
     nodes, omega = [], []
@@ -65,7 +65,7 @@ def stated(
         per_decade = _FINE_PER_DECADE if fine else _PER_DECADE
         omega.append(margin_nodes(scenario.problem, poles, per_decade))
     tolerance = 1e-13 if fine else 1e-4 if rough else 1e-6
-    return Programme(
+    return GainProgramme(
         family,
         nodes,
         omega,
@@ -107,7 +107,7 @@ def settle(
         Most renewals of the nodes; the first of them, far from the answer, holds margins by discs,
         which see a limit before it is broken.  One alone goes only roughly to the end, if not fine.
     reach, tighten
-        See `Programme.solve`.
+        See `GainProgramme.solve`.
     """
     last: Solution | None = None
     iterations = 0

@@ -86,7 +86,7 @@ class Solution:
         return self.coefficients[0]
 
 
-class Programme:
+class GainProgramme:
     """A programme on a set of nodes, solved from any number of starts.
 
     Parameters

@@ -118,7 +118,8 @@ def follow(
     """Return the optimum of a problem from starts close to it, or None if none arrives.
 
     Starts are answers of neighbours, or parameters, with the coefficients of the elements; those
-    that do not stabilise the loop are left out.  For goal and relaxed see `synth.search.Programme`.
+    that do not stabilise the loop are left out.  For goal and relaxed see
+    `synth.search.GainProgramme`.
     """
     known = tuple(coefficients or problem.begin)
     starts = [

@@ -114,7 +114,7 @@ def nlp_oracle(
         cost += ca.mtimes(row, states[j]) ** 2
     steady = float(winch.steady @ c)
     for j in range(N):
-        cost += weights.weight * (d[j] - steady) ** 2
+        cost += weights.weights[1] * (d[j] - steady) ** 2
     zeta = np.concatenate([sea[N], c])
     cost += ca.bilin(ca.DM(weights.P), states[N], states[N])
     cost += 2.0 * ca.dot(states[N], ca.DM(weights.N @ zeta))
@@ -179,7 +179,7 @@ def _rows(
 ) -> tuple[list[Any], FloatArray, FloatArray]:
     """Return the soft rows, scaled to their limits, and these."""
     winch, p, drift = controller.model.winch, controller.programme, controller.stage.drift
-    scale = controller.products.scale
+    scale = controller.programme.scale
     rows: list[Any] = []
     for kind, at, factor in zip(p.kind, p.at, scale, strict=True):
         name, j = WATCHED[kind], int(at)
@@ -196,7 +196,7 @@ def _rows(
             of = winch.speed if name == "speed" else winch.payload
             value = ca.dot(ca.DM(of), states[j])
         rows.append(float(factor) * value)
-    low, high = np.array(controller.products.low), np.array(controller.products.high)
+    low, high = np.array(controller.programme.row_low), np.array(controller.programme.row_high)
     window = controller.window
     if window.narrows:
         starts = np.cumsum((0, *p.blocks[:-1]))[1:].tolist()

@@ -14,6 +14,7 @@ from sea_predictor import SeaPredictor
 
 import models
 import stillhook as sh
+from models.case import bundled_cases
 from models.operation import scenario_named
 from models.plant import DriveLimits
 from models.sensing import HEARD, Measurement
@@ -24,6 +25,7 @@ from mpc.winch.regulation import feedback_row
 from synth.controllers import VelocityFeedForward
 
 _NAN = float("nan")
+BUNDLED = [name for name, _ in bundled_cases()]
 
 
 def state_of(controller: LinearMPC, rng: np.random.Generator, size: float) -> np.ndarray:
@@ -42,7 +44,7 @@ def question_of(controller: LinearMPC, chi: np.ndarray):
     speed = float(controller.model.winch.speed @ chi[: controller.model.winch.size])
     moves = len(controller.programme.blocks)
     low, high = controller.window.bounds(speed, np.zeros(moves), math.inf)
-    return controller.products.question(gradient, free, low, high), low, high
+    return controller.programme.question(gradient, free, low, high), low, high
 
 
 def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tuple[float, dict]:
@@ -67,7 +69,7 @@ def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tup
         ends = np.concatenate([shown @ sea, shown @ after])
         x = winch.A @ x + winch.B[:, 0] * d[j] + winch.from_hook @ ends + winch.from_constants @ c
         sea = after
-        cost += weights.weight * (d[j] - steady) ** 2
+        cost += weights.weights[1] * (d[j] - steady) ** 2
         if j + 1 < p.steps:
             cost += (winch.payload @ x) ** 2
     seen["speed", p.steps] = winch.speed @ x
@@ -91,13 +93,13 @@ def test_programme_is_the_cost_of_stepping_the_model(name):
         v = rng.normal(size=n)
         cost, seen = simulated_cost(controller, chi, v)
         assert 0.5 * v @ p.H @ v + f @ v == pytest.approx(cost - base, rel=1e-8, abs=1e-8 * base)
-        rows = controller.products.rows @ v
+        rows = controller.programme.qp.rows @ v
         for k, (j, kind) in enumerate(zip(p.at, p.kind, strict=True)):
             # row + free response = signal, in units of its limit
-            free = controller.products.low[k] - lower[n + k]
+            free = controller.programme.row_low[k] - lower[n + k]
             if WATCHED[kind] == "command" and not controller.model.winch.dc:
                 continue
-            wanted = seen[WATCHED[kind], j] * controller.products.scale[k]
+            wanted = seen[WATCHED[kind], j] * controller.programme.scale[k]
             assert rows[k] + free == pytest.approx(wanted, rel=1e-7, abs=1e-9)
 
 
@@ -134,60 +136,48 @@ def test_without_active_limits_it_is_the_linear_quadratic_regulator(name):
         pytest.fail("every state was limited")
 
 
-def test_it_agrees_with_the_plain_statement_in_cvxpy():
-    _compare_with_oracle("thesis-1975", states=60, horizon=1.5)
+@pytest.mark.parametrize("name", BUNDLED)
+def test_it_agrees_with_the_plain_statement_in_cvxpy(name):
+    _compare_with_oracle(name, states=12, horizon=0.6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
+@pytest.mark.ci
+@pytest.mark.parametrize("name", BUNDLED)
 def test_it_agrees_with_the_plain_statement_in_cvxpy_on_a_thousand_states(name):
-    _compare_with_oracle(name, states=1000, horizon=2.0)
-
-
-def programme_cost(qp: SoftQP, question, v: np.ndarray) -> float:
-    f, lower, upper = question
-    n = len(f)
-    value = qp.rows @ v
-    over = np.maximum(np.maximum(value - upper[n:], lower[n:] - value), 0.0)
-    soft = 0.5 * qp.quadratic * over @ over + qp.linear * over.sum()
-    return float(0.5 * v @ qp.H @ v + f @ v + soft)
+    _compare_with_oracle(name, states=1000, horizon=1.0)
 
 
 def _compare_with_oracle(name: str, *, states: int, horizon: float) -> None:
-    controller = controller_of(name, horizon=horizon)
+    """All moves are equal, to 1e-6 of the peak torque, wherever CVXPY has found the optimum.
+
+    States are far off: some violate their limits a thousandfold, at prices that leave the residual
+    of our answer 1e-5 where the moves are right to 1e-7.
+    """
+    weights = WEIGHTS.get(name, WEIGHTS["subsea-crane"])
+    controller = LinearMPC(models.load_case(name), weights=weights, horizon=horizon)
     plain, model = oracle(controller), controller.model
     p, winch = controller.programme, model.winch
     rng = np.random.default_rng(3)
-    active = agreed = unproved = 0
+    active = lost = 0
     ahead = np.linalg.matrix_power(model.A[model.sea_at, model.sea_at], p.steps)
     for _ in range(states):
         chi = state_of(controller, rng, float(rng.choice([0.1, 0.5, 1.0])))
         question, low, high = question_of(controller, chi)
         solved = controller.qp.solve(*question)
-        # 1e-6 is what counts as proved, and where the arithmetic ends for a state this far off
-        # (measured: all on one spring, all but two of a thousand on the crane, those to 2e-6).
-        residual = kkt_residual(controller.qp, *question, solved)
-        unproved += int(residual >= 1e-6)
-        assert residual < 1e-5
         plain.state.value = chi[: winch.size]
         at = model.constants_at.start
         plain.constants.value = chi[at : at + 2]
         plain.path.value = (path_of_sea(model, p.steps) @ chi[model.sea_at]).reshape(-1, 2)
         plain.end.value = ahead @ chi[model.sea_at]
         plain.low.value, plain.high.value = low, high
-        moves = plain.solve()
-        theirs, ours = (programme_cost(controller.qp, question, v) for v in (moves, solved.v))
-        assert ours <= theirs + 1e-8 * (1.0 + abs(theirs))
-        # Where the cost is flat, equal costs to twelve digits leave the move open by some 1e-5.
-        agreed += int(abs(moves[0] - solved.v[0]) < 1e-6)
-        if theirs <= ours + 1e-12 * (1.0 + abs(ours)):
-            assert moves[0] == pytest.approx(solved.v[0], abs=1e-4)
+        moves, residual = plain.solve()
+        assert kkt_residual(controller.qp, *question, solved) < 1e-4
+        if residual < 1e-9:
+            np.testing.assert_allclose(solved.v, moves, rtol=0.0, atol=1e-6)
+        lost += int(residual >= 1e-9)
         active += int((solved.multipliers != 0.0).any())
     assert active > states / 2
-    assert unproved <= (0.0 if name == "thesis-1975" else 0.003) * states
-    # the others: a flat cost, or Clarabel stops short of the optimum at a cost above ours
-    # (measured: all but a few of a thousand on one spring, 936 on the crane)
-    assert agreed >= (0.97 if name == "thesis-1975" else 0.9) * states
+    assert lost <= 0.005 * states  # where Clarabel's answer is too far off to be finished
 
 
 def test_a_soft_limit_that_costs_more_is_violated_less():
@@ -195,7 +185,7 @@ def test_a_soft_limit_that_costs_more_is_violated_less():
     rng = np.random.default_rng(4)
     chi = state_of(controller, rng, 0.3)
     question, _, _ = question_of(controller, chi)
-    rows, H = controller.products.rows, controller.programme.H
+    rows, H = controller.programme.qp.rows, controller.programme.H
     n = len(H)
     beyond = []
     for price in (1e-8, 1e-4, 1.0):
@@ -473,7 +463,9 @@ class Failing:
         self.name, self.sample_time = controller.name, controller.sample_time
         self._controller, self._fails, self._time = controller, fails, 0.0
         solve = controller.qp.solve
-        controller.qp.solve = lambda *asked: replace(solve(*asked), ok=not self._fails(self._time))
+        controller.qp.solve = lambda *asked: replace(
+            solve(*asked), flag=-1 if self._fails(self._time) else 1
+        )
 
     @property
     def status(self):

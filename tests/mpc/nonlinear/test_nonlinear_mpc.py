@@ -209,7 +209,7 @@ def test_without_nonlinearities_it_is_the_linear_controller(name: str) -> None:
         speed = float(linear.model.winch.speed @ chi[: linear.model.winch.size])
         ahead, gradient, free = linear.products.known(chi)
         low, high = off.hard_bounds(speed)
-        answer = linear.qp.solve(*linear.products.question(gradient, free, low, high))
+        answer = linear.qp.solve(*linear.programme.question(gradient, free, low, high))
         off.reset()
         found, _ = off.shooting.known(chi)
         np.testing.assert_array_equal(found, ahead)

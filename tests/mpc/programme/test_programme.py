@@ -10,9 +10,11 @@ import scipy.linalg
 
 from models.basics import InputError
 from mpc.programme import (
+    Condensed,
+    Constraint,
     Horizon,
+    Signals,
     SoftQP,
-    condense,
     corrected,
     default_blocking,
     end_of_record,
@@ -25,7 +27,8 @@ from mpc.programme import (
 
 N, NX, NW, NC, NH = 9, 3, 2, 2, 4
 BLOCKS = (1, 2, 2, 4)
-WEIGHT, UNIT, SCALE = 0.3, 2.5, 0.7
+WEIGHTS, UNITS, SCALE = np.array([1.0, 0.3, 0.1]), np.array([2.5, 0.4]), 0.7
+NU = len(UNITS)
 
 
 def matrix(rng, *shape):
@@ -46,17 +49,24 @@ def rng():
 def horizon(rng):
     return Horizon(
         A=stable(rng, NX),
-        B=matrix(rng, NX, 1),
+        B=matrix(rng, NX, NU),
         from_path=matrix(rng, NX, 2 * NW),
         from_constants=matrix(rng, NX, NC),
         blocks=BLOCKS,
-        unit=UNIT,
+        units=UNITS,
     )
 
 
 @pytest.fixture
-def output(rng):
-    return matrix(rng, NX)
+def costs(rng):
+    """Three signals that cost: of state, inputs, path at both ends and constants."""
+    return Signals(
+        names=("a", "b", "c"),
+        C=matrix(rng, 3, NX),
+        D=matrix(rng, 3, NU),
+        F=matrix(rng, 3, 2 * NW),
+        G=matrix(rng, 3, NC),
+    )
 
 
 @pytest.fixture
@@ -66,29 +76,36 @@ def sea(rng):
 
 
 @pytest.fixture
-def regulator(horizon, output, sea):
-    A, B = np.asarray(horizon.A), np.asarray(horizon.B)
+def regulator(horizon, costs, sea):
     Phi, shown = sea
-    over = scipy.linalg.block_diag(Phi, np.eye(NC))
-    moved = horizon.from_path[:, :NW] @ shown + horizon.from_path[:, NW:] @ shown @ Phi
-    # The input that holds the output against each constant.
-    system = np.block([[A - np.eye(NX), B], [output[None, :], np.zeros((1, 1))]])
-    held = np.linalg.solve(system, np.vstack([-horizon.from_constants, np.zeros((1, NC))]))
+
+    def of_sea(rows):
+        return rows[:, :NW] @ shown + rows[:, NW:] @ shown @ Phi
+
     return lq_regulator(
-        A,
-        B,
-        output,
-        weight=WEIGHT,
+        horizon.A,
+        horizon.B,
+        costs.C,
+        costs.D,
+        weights=WEIGHTS,
         scale=np.array([1.0, 10.0, 0.1]),
-        Gamma=np.hstack([moved, horizon.from_constants]),
-        Phi=over,
-        steady=np.concatenate([np.zeros(NH), held[-1]]),
+        Gamma=np.hstack([of_sea(horizon.from_path), horizon.from_constants]),
+        Phi=scipy.linalg.block_diag(Phi, np.eye(NC)),
+        M=np.hstack([of_sea(costs.F), costs.G]),
     )
 
 
-def rows(j, S):
-    """Two signals at every second sample."""
-    return [(0, S[0]), (1, S[1] - S[2])] if j % 2 == 0 else []
+@pytest.fixture
+def signals():
+    """Two signals of the state, which have limits at every second sample."""
+    C = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -1.0]])
+    return Signals(
+        names=("first", "other"),
+        C=C,
+        D=np.zeros((2, NU)),
+        F=np.zeros((2, 2 * NW)),
+        G=np.zeros((2, NC)),
+    )
 
 
 def motion(horizon, x, path, c, v):
@@ -96,75 +113,108 @@ def motion(horizon, x, path, c, v):
     states = [x]
     for j, k in enumerate(np.repeat(np.arange(len(BLOCKS)), BLOCKS)):
         push = horizon.from_path @ np.concatenate([path[j], path[j + 1]])
-        push = push + horizon.from_constants @ c + horizon.B[:, 0] * UNIT * v[k]
+        push = push + horizon.from_constants @ c + horizon.B @ (UNITS * v[k])
         states.append(horizon.A @ states[-1] + push)
     return np.array(states)
 
 
-def cost(horizon, regulator, output, x, path, c, v, end):
-    states = motion(horizon, x, path, c, v)
-    d = UNIT * np.repeat(v, BLOCKS) - regulator.steady[NH:] @ c
+def cost(horizon, regulator, costs, x, path, c, v, end):
+    states, d = motion(horizon, x, path, c, v), UNITS * np.repeat(v, BLOCKS, axis=0)
+    value = 0.0
+    for j in range(N):
+        s = costs.C @ states[j] + costs.D @ d[j] + costs.G @ c
+        s = s + costs.F @ np.concatenate([path[j], path[j + 1]])
+        value += WEIGHTS @ s**2
     zeta, last = np.concatenate([end, c]), states[-1]
-    value = ((states[1:-1] @ output) ** 2).sum() + WEIGHT * (d**2).sum()
     return value + last @ regulator.P @ last + 2.0 * last @ regulator.N @ zeta
 
 
-def condensed(horizon, regulator, output):
-    return condense(
-        horizon, regulator, output=output, scale=SCALE, speed=np.eye(NX)[1], signals=rows
+def condensed(horizon, regulator, costs, signals):
+    every_second = frozenset(range(0, N + 1, 2))
+    return Condensed(
+        horizon,
+        signals=signals,
+        cost=costs,
+        end=regulator,
+        constraints=[
+            Constraint(signal="first", low=-2.0, soft=True, samples=every_second),
+            Constraint(signal="other", low=-0.5, high=4.0, samples=every_second),
+        ],
+        inputs=("u", "v"),
+        rest={},
+        scale=SCALE,
+        traced="first",
     )
+
+
+def asked(rng):
+    """State, path, constants, and the disturbance's state at the end."""
+    return (matrix(rng, *n) for n in ((NX,), (N + 1, NW), (NC,), (NH,)))
 
 
 def test_the_states_of_a_horizon_are_those_of_the_plant(horizon, rng):
     x, path, c = matrix(rng, NX), matrix(rng, N + 1, NW), matrix(rng, NC)
-    v = matrix(rng, len(BLOCKS))
-    columns = np.concatenate([x, path.ravel(), c, v])
+    v = matrix(rng, len(BLOCKS), NU)
+    columns = np.concatenate([x, path.ravel(), c, v.ravel()])
     found = [S @ columns for S in horizon.states()]
     np.testing.assert_allclose(found, motion(horizon, x, path, c, v), atol=1e-12)
 
 
-def test_the_programme_is_the_cost_summed_along_the_motion(horizon, regulator, output, rng):
-    p = condensed(horizon, regulator, output)
-    x, path, c, end = (matrix(rng, *n) for n in ((NX,), (N + 1, NW), (NC,), (NH,)))
+def test_the_programme_is_the_cost_summed_along_the_motion(horizon, regulator, costs, signals, rng):
+    p = condensed(horizon, regulator, costs, signals)
+    x, path, c, end = asked(rng)
     f = p.gradient @ np.concatenate([x, path.ravel(), c]) + p.from_end @ end
-    asked = horizon, regulator, output, x, path, c
-    for v in matrix(rng, 5, len(BLOCKS)):
-        more = cost(*asked, v, end) - cost(*asked, np.zeros(len(BLOCKS)), end)
-        assert N * SCALE * (0.5 * v @ p.H @ v + f @ v) == pytest.approx(more, rel=1e-10)
+    known = horizon, regulator, costs, x, path, c
+    none = np.zeros((len(BLOCKS), NU))
+    for v in matrix(rng, 5, len(BLOCKS), NU):
+        more = cost(*known, v, end) - cost(*known, none, end)
+        moves = v.ravel()
+        assert SCALE * (0.5 * moves @ p.H @ moves + f @ moves) == pytest.approx(more, rel=1e-10)
 
 
-def test_its_rows_are_the_signals_and_its_speeds_those_at_the_blocks(
-    horizon, regulator, output, rng
-):
-    p = condensed(horizon, regulator, output)
-    x, path, c = matrix(rng, NX), matrix(rng, N + 1, NW), matrix(rng, NC)
-    v = matrix(rng, len(BLOCKS))
+def test_its_rows_are_the_signals_over_their_limits(horizon, regulator, costs, signals, rng):
+    p = condensed(horizon, regulator, costs, signals)
+    x, path, c, _ = asked(rng)
+    v = matrix(rng, len(BLOCKS), NU)
     states = motion(horizon, x, path, c, v)
-    found = p.rows @ np.concatenate([x, path.ravel(), c, v])
-    signals = np.column_stack([states[:, 0], states[:, 1] - states[:, 2]])
-    np.testing.assert_allclose(found, signals[p.at, p.kind], atol=1e-12)
-    assert p.at.tolist() == [0, 0, 2, 2, 4, 4, 6, 6, 8, 8]
-    columns = np.concatenate([x, path.ravel(), c, v])
-    np.testing.assert_allclose(p.speeds @ columns, states[[0, 1, 3, 5], 1], atol=1e-12)
+    columns = np.concatenate([x, path.ravel(), c, v.ravel()])
+    shown = states @ signals.C.T
+    np.testing.assert_allclose(p.rows @ columns, shown[p.at, p.kind] * p.scale, rtol=1e-10)
+    # Hard ones first; the first sample is past.
+    assert p.at.tolist() == [2, 4, 6, 8, 2, 4, 6, 8]
+    assert p.kind.tolist() == [1] * 4 + [0] * 4
+    # Soft ones over their limits; hard ones such that the solver takes none for nothing.
+    assert p.scale[4:].tolist() == [0.5] * 4
+    moved = p.rows[:4, p.horizon.moves]
+    reach = np.einsum("ij,ji->i", moved, np.linalg.solve(p.H, moved.T))
+    np.testing.assert_allclose(reach, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(p.row_low, np.r_[-0.5 * p.scale[:4], [-1.0] * 4], rtol=1e-12)
+    np.testing.assert_allclose(p.row_high, np.r_[4.0 * p.scale[:4], [1e20] * 4], rtol=1e-12)
+    np.testing.assert_allclose(p.traced @ columns, states[[0, 1, 3, 5], 0], atol=1e-12)
 
 
 def test_without_blocks_and_limits_its_first_move_is_the_regulators(
-    horizon, regulator, output, sea, rng
+    horizon, regulator, costs, signals, sea, rng
 ):
     free = replace(horizon, blocks=(1,) * N)
-    p = condensed(free, regulator, output)
+    p = condensed(free, regulator, costs, signals)
     x, c, h = matrix(rng, NX), matrix(rng, NC), matrix(rng, NH)
     path = free_outputs(*sea, N) @ h
     end = np.linalg.matrix_power(sea[0], N) @ h
     f = p.gradient @ np.concatenate([x, path, c]) + p.from_end @ end
-    v = -np.linalg.solve(p.H, f)
     wanted = -regulator.K @ x - regulator.K_disturbance @ np.concatenate([h, c])
-    assert UNIT * v[0] == pytest.approx(wanted, rel=1e-9)
+    np.testing.assert_allclose(UNITS * (p.law @ f), wanted, rtol=1e-9)
 
 
-def test_the_regulators_value_function_is_that_of_the_riccati_equation(horizon, regulator, output):
-    A, B = np.asarray(horizon.A), np.asarray(horizon.B)
-    P = scipy.linalg.solve_discrete_are(A, B, np.outer(output, output), [[WEIGHT]])
+def test_the_regulators_value_function_is_that_of_the_riccati_equation(horizon, regulator, costs):
+    C, D = costs.C, costs.D
+    P = scipy.linalg.solve_discrete_are(
+        horizon.A,
+        horizon.B,
+        C.T * WEIGHTS @ C,
+        D.T * WEIGHTS @ D,
+        s=C.T * WEIGHTS @ D,
+    )
     np.testing.assert_allclose(regulator.P, P, rtol=1e-9, atol=1e-9 * np.abs(P).max())
 
 

@@ -86,7 +86,7 @@ def test_the_unsaturated_controller_is_the_regulator_of_late_commands(
     _, gradient, free = controller.products.known(chi)
     speed = float(model.winch.reckoned @ chi[:n])
     bounds = controller.window.bounds(speed, np.zeros(60), math.inf)
-    solved = controller.qp.solve(*controller.products.question(gradient, free, *bounds))
+    solved = controller.qp.solve(*controller.programme.question(gradient, free, *bounds))
     assert not (solved.multipliers != 0.0).any()
     wanted = -float(feedback_row(controller.regulator, model) @ chi)
     assert solved.v[0] * controller.programme.unit == pytest.approx(wanted, rel=1e-6, abs=1e-6)

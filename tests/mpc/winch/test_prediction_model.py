@@ -179,23 +179,27 @@ def test_regulator_is_what_a_long_backward_recursion_of_the_whole_state_ends_at(
     model = prediction_model(sampled_winch(case_of(name)))
     found = regulator(model, 0.1)
     winch = model.winch
-    n, nz = winch.size, len(found.Phi)
-    A = np.block([[np.array(winch.A), found.Gamma], [np.zeros((nz, n)), found.Phi]])
+    n, nz = winch.size, model.sea.order + 2
+    sea, steady = model.A[model.sea_at, model.sea_at], np.zeros(nz)
+    steady[-2:] = winch.steady
+    A = np.zeros((n + nz, n + nz))
+    A[:n, :n], A[:n, n:-2], A[:n, -2:] = winch.A, model.A[:n, model.sea_at], winch.from_constants
+    A[n:-2, n:-2], A[-2:, -2:] = sea, np.eye(2)
     B = np.vstack([winch.B, np.zeros((nz, 1))])
     payload = np.concatenate([winch.payload, np.zeros(nz)])
     # in d' = d - d_inf zeta the cost is p^2 + rho d'^2
-    A[:n] += np.outer(B[:n, 0], np.concatenate([np.zeros(n), found.steady]))
+    A[:n] += np.outer(B[:n, 0], np.concatenate([np.zeros(n), steady]))
     scale = np.concatenate([model.scale[:n], np.ones(nz)])
     A, b = A / scale[:, None] * scale, B[:, 0] / scale
     Q = np.outer(payload * scale, payload * scale)
     V = np.zeros_like(Q)
     for _ in range(3000):
-        gain = b @ V @ A / (b @ V @ b + found.weight)
+        gain = b @ V @ A / (b @ V @ b + found.weights[1])
         V = Q + A.T @ V @ A - np.outer(gain, A.T @ V @ b)
         V = 0.5 * (V + V.T)
     gain = gain / scale
-    assert pytest.approx(gain[:n], rel=1e-5, abs=1e-6 * np.abs(gain).max()) == found.K
-    assert found.K_disturbance + found.steady == pytest.approx(
+    assert pytest.approx(gain[:n], rel=1e-5, abs=1e-6 * np.abs(gain).max()) == found.K[0]
+    assert found.K_disturbance[0] + steady == pytest.approx(
         gain[n:], rel=1e-4, abs=1e-5 * np.abs(gain[n:]).max()
     )
     V = V / np.outer(scale, scale)

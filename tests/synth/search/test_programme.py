@@ -35,7 +35,7 @@ from synth import (
 )
 from synth.loop import Assessment, Element, LossElement, disturbances
 from synth.question import Goal, Problem
-from synth.search import Programme
+from synth.search import GainProgramme
 from synth.structures import Structure
 
 OMEGA = np.geomspace(1e-3, 1e3, 60)
@@ -81,10 +81,10 @@ def view(question: Problem, values, known: tuple[float, ...] | None = None) -> A
     )
 
 
-def programme(question: Problem, values, goal: Goal = Goal.COST, **options) -> Programme:
+def programme(question: Problem, values, goal: Goal = Goal.COST, **options) -> GainProgramme:
     known = tuple(element.reference for element in question.elements)
     nodes = view(question, values, known).quadrature(question.outputs)
-    return Programme(question, [nodes], [OMEGA], goal, reference=np.array(values), **options)
+    return GainProgramme(question, [nodes], [OMEGA], goal, reference=np.array(values), **options)
 
 
 MASS = problem(double_integrator(), LowOrder(2), LIMITS)
@@ -209,7 +209,7 @@ def test_every_answer_is_stable_even_where_the_optimum_lies_at_the_edge() -> Non
     # Without a price on the effort the best loop of an undamped mass is as fast as can be; with
     # too few nodes the sum can be made small by loops that the nodes do not see.
     question = problem(with_full_state(double_integrator()), StaticGain(), minimise={"x": 1.0})
-    made = Programme(
+    made = GainProgramme(
         question,
         [Quadrature(omega=[0.5, 1.0, 2.0], weights=[0.5, 0.7, 1.0])],
         [OMEGA],
