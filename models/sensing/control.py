@@ -52,6 +52,7 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "engaged": "",
         "limited": "",
         "gated": "the controller did not believe a sensor",
+        "derated": "the drive gives less torque than its limits say",
         "blind": "the controller has heard nothing of the payload for a second",
         "fallback": "the controller had no answer in time and fell back on a simpler law",
     }
