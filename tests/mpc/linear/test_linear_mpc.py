@@ -190,6 +190,18 @@ def _compare_with_oracle(name: str, *, states: int, horizon: float) -> None:
     assert agreed >= (0.97 if name == "thesis-1975" else 0.9) * states
 
 
+def test_states_far_from_any_sea_are_solved_within_half_of_the_iterations():
+    """With 400 of them some had no answer."""
+    controller = controller_of("thesis-1975-rope", 3.75)
+    rng, taken = np.random.default_rng(0), []
+    for _ in range(300):
+        question, _, _ = question_of(controller, state_of(controller, rng, 3.0))
+        solved = controller.qp.solve(*question)
+        assert solved.ok
+        taken.append(solved.iterations)
+    assert 400 < max(taken) < 750
+
+
 def test_a_soft_limit_that_costs_more_is_violated_less():
     controller = controller_of("thesis-1975", horizon=2.0, excursion=0.02)
     rng = np.random.default_rng(4)
