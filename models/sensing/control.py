@@ -53,6 +53,7 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "limited": "",
         "gated": "the controller did not believe a sensor",
         "misfit": "the sea is not as the controller was told, which goes by others",
+        "derated": "the drive gives less torque than its limits say",
         "blind": "the controller has heard nothing of the payload for a second",
         "fallback": "the controller had no answer in time and fell back on a simpler law",
     }

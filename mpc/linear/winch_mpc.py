@@ -17,7 +17,8 @@ handed in as a fallback hears all the time, and its command is passed on instead
 
 Peak torque and current are constants; the power limit narrows the window with the speed, which is
 taken from the last plan; the voltage of a DC drive bounds the first move by the speed that is there
-now.  The windings' temperature follows from the torque that the drive reports.
+now.  The windings' temperature follows from the torque that the drive reports.  So does the peak,
+where the drive reports that it follows less.
 """
 
 import math
@@ -46,6 +47,7 @@ from ..programme import (
     kkt_residual,
 )
 from ..winch import (
+    MotorInertia,
     PredictionModel,
     SampledWinch,
     Weights,
@@ -69,12 +71,17 @@ _IN_BAND = 3.0  # [rad/s]
 _STALE = 1.0  # of a plan [s]
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
+_APPLIED, _SPEED = HEARD.index("drive.applied"), HEARD.index("motor.speed")
 _REFERENCE = HEARD.index("reference.displacement")
 
 _EDGE = 1e-7  # of a move that is at its bound
 _MOST = 0.2  # of the peak: half of what the torque may fall by over a sample
 _MORE = 0.2  # of the fall, so that the drive stays at its peak though the plan is off
 _STATIC = 1.2  # of the static torque: never less, whatever the temperature
+_SHORT = 3  # samples in a row that a drive gives less than asked, until that is its peak
+_SEEN = 5e-3  # of the peak: what is less is no difference
+_PROBE = 0.01  # of the peak learnt, by which a drive that follows there is asked for more
+_LEAST = 0.3  # of the peak: who gives less is not engaged
 
 
 class WinchOptions(TypedDict, total=False):
@@ -114,8 +121,9 @@ class WinchMPC(ABC):
         from: None for the estimator's own sea.
     soft_limits
         Lowest and highest deviation from rest by signal.
-    window
-        What torque the drive can give, as bounds on the moves.
+    window, inertia
+        What torque the drive can give, as bounds on the moves, and what turns at the motor, over
+        that of the case.
     programme, products, qp
         The condensed programme, what of a step does not change, and the solver.
     question, solved
@@ -201,6 +209,7 @@ class WinchMPC(ABC):
         self._shows = np.ascontiguousarray(believed.hook[:, believed.sea_at])  # of the sea's state
         unit = case.winch.drive.torque_peak
         self.window = DriveWindow(self.model.winch, limits, len(blocks), unit)
+        self.inertia = MotorInertia(winch)
         if fallback is not None and not math.isclose(fallback.sample_time, T):
             raise InputError(
                 f"{_OWNER}: fallback must have the sample time {T:g} s, got "
@@ -234,6 +243,8 @@ class WinchMPC(ABC):
             return "blind"
         if self.estimator.gated:
             return "gated"
+        if self.window.derated:
+            return "derated"
         if getattr(self.predictor, "misfit", False):
             return "misfit"
         full = abs(self._asked) >= self.window.peak * (1.0 - _EDGE)
@@ -249,6 +260,8 @@ class WinchMPC(ABC):
     def reset(self) -> None:
         """Forget every earlier measurement."""
         self.estimator.reset()
+        self.window.reset()
+        self.inertia.reset()
         self.qp.reset()
         if self._budget is not None:
             self._budget.reset()
@@ -261,9 +274,21 @@ class WinchMPC(ABC):
             self._fallback.reset()
         self._speeds = np.zeros(len(self._blocks))  # at the start of each move, by the last plan
         self._asked = self.model.winch.rest_torque  # of the drive at the sample before [N m]
+        self._sent = math.nan  # the command of the sample before
         self._set_point = np.zeros(2)  # displacement [m] and velocity [m/s], the last finite one
         self._counts = dict.fromkeys(
-            ("steps", "iterations", "late", "unproved", "gated", "blind", "misfit", "fallback"), 0
+            (
+                "steps",
+                "iterations",
+                "late",
+                "unproved",
+                "gated",
+                "derated",
+                "blind",
+                "misfit",
+                "fallback",
+            ),
+            0,
         )
         self.question: Question | None = None
         self.solved: QPSolution | None = None
@@ -353,7 +378,7 @@ class WinchMPC(ABC):
 
     def _given(self, command: float) -> float:
         """Return a command within the voltage, of which the estimator hears where it is late."""
-        command = min(max(command, -self.window.voltage), self.window.voltage)
+        self._sent = command = min(max(command, -self.window.voltage), self.window.voltage)
         if self.model.winch.waiting:
             self.estimator.given = command
         return command
@@ -375,6 +400,10 @@ class WinchMPC(ABC):
     def _hear(self, measurement: Measurement, time: float, applied: float) -> FloatArray:
         """Return the estimate of a sample, (n,), and let the fallback hear it too."""
         self._counts["steps"] += 1
+        shown = measurement.values
+        left_out = self._sent - float(shown[_APPLIED])
+        cut = self.window.follow(float(shown[_TORQUE]), left_out, float(shown[_SPEED]))
+        self.inertia.update(shown, cut)
         self._other = math.nan
         if self._fallback is not None:
             self._other = float(self._fallback.step(measurement, time))
@@ -453,14 +482,60 @@ class DriveWindow:
     def __init__(self, winch: SampledWinch, limits: DriveLimits, moves: int, unit: float) -> None:
         self._winch, self._unit = winch, unit
         constant = winch.data.torque_constant if winch.dc else 1.0
-        self.peak = min(limits.torque, constant * limits.current)
+        self._moves, self._told = moves, min(limits.torque, constant * limits.current)
         self.voltage = limits.voltage if winch.dc else math.inf
         self.limits = limits
         self.narrows = min(limits.power, limits.breakdown) < math.inf
         #: What the torque of a held command falls by for each rad/s that the motor gets faster.
         self.fall = winch.gain * winch.back
-        self._low = np.full(moves, (-self.peak - winch.rest_torque) / unit)
-        self._high = np.full(moves, (self.peak - winch.rest_torque) / unit)
+        self.reset()
+
+    def reset(self) -> None:
+        """Hold the drive's peak to be what it was told to be."""
+        self._short = 0  # samples in a row in which it gave less than asked
+        self._take(self._told)
+
+    @property
+    def derated(self) -> bool:
+        """Whether the drive gives less than its peak was told to be."""
+        return self.peak < self._told
+
+    def follow(self, torque: float, left_out: float, speed: float) -> bool:
+        """Learn the peak from what the drive follows; return whether it left some out.
+
+        Where it gives less than asked, and less than its limits say, for some samples, that is its
+        peak; where it then gives as much as it is asked for, the peak is probed a little higher.
+
+        Parameters
+        ----------
+        torque
+            What the drive gives [N m].
+        left_out
+            The command asked for at the sample before over the one that it follows.
+        speed
+            The motor's [rad/s].
+        """
+        given = abs(torque)
+        if math.copysign(self._winch.gain, torque) * left_out > _SEEN * self._told:
+            self._short += 1
+            if self._short < _SHORT or not _LEAST * self._told < given:
+                return True
+            # Near its highest speed the drive's own window closes.
+            top = self.limits.top(speed, self._told)
+            below = given < (1.0 - _SEEN) * top and abs(speed) < (1.0 - _CLEAR) * self.limits.speed
+            if below or given > self.peak:
+                self._take(min(given, self._told))
+            return True
+        self._short = 0
+        if self.derated and given > (1.0 - _SEEN) * self.peak:
+            self._take(min((1.0 + _PROBE) * max(given, self.peak), self._told))
+        return False
+
+    def _take(self, peak: float) -> None:
+        """Take a torque as the drive's peak [N m]."""
+        self.peak, rest = peak, self._winch.rest_torque
+        self._low = np.full(self._moves, (-peak - rest) / self._unit)
+        self._high = np.full(self._moves, (peak - rest) / self._unit)
 
     def bounds(
         self, speed: float, speeds: FloatArray, cap: float, changes: FloatArray | None = None

@@ -11,6 +11,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .estimator import WinchEstimator
     from .gate import SignalGate
+    from .inertia import MotorInertia
     from .planning import plan_model
     from .prediction import PredictionModel, ProcessNoise, prediction_model, with_noise
     from .regulation import feedback_row, regulator

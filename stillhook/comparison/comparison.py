@@ -77,7 +77,7 @@ _BROKEN = {
     "tension above": "tension high",
 }
 # What a controller counts that is no command replaced: of a late plan the fallback is counted.
-_NO_FALLBACKS = ("steps", "iterations", "late", "gated", "blind", "misfit")
+_NO_FALLBACKS = ("steps", "iterations", "late", "gated", "derated", "blind", "misfit")
 _MEANS = {
     "significant": "payload significant",
     "largest": "tracking error largest",

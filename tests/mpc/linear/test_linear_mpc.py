@@ -180,6 +180,18 @@ def _compare_with_oracle(name: str, *, states: int, horizon: float) -> None:
     assert lost <= 0.005 * states  # where Clarabel's answer is too far off to be finished
 
 
+def test_states_far_from_any_sea_are_solved_within_half_of_the_iterations():
+    """With 400 of them some had no answer."""
+    controller = controller_of("thesis-1975-rope", 3.75)
+    rng, taken = np.random.default_rng(0), []
+    for _ in range(300):
+        question, _, _ = question_of(controller, state_of(controller, rng, 3.0))
+        solved = controller.qp.solve(*question)
+        assert solved.ok
+        taken.append(solved.iterations)
+    assert 400 < max(taken) < 750
+
+
 def test_a_soft_limit_that_costs_more_is_violated_less():
     controller = controller_of("thesis-1975", horizon=2.0, excursion=0.02)
     rng = np.random.default_rng(4)
@@ -635,6 +647,102 @@ def test_moves_stay_below_the_breakdown_torque_at_the_planned_speeds() -> None:
     assert most < case.winch.power_limit / (2.0 * base)
     assert high * unit + rest == pytest.approx(most, rel=1e-9)
     assert low * unit + rest == pytest.approx(-most, rel=1e-9)
+
+
+def off(case: models.Case, inertia: float = 1.0, torque: float = 1.0) -> models.Case:
+    """A case whose motor is another; a DC motor's current goes with its torque."""
+    winch = case.winch
+    return case.replace(
+        {
+            "winch.motor.inertia": inertia * winch.motor.inertia,
+            "winch.gearbox.inertia": inertia * winch.gearbox.inertia,
+            "winch.drive.torque_peak": torque * winch.drive.torque_peak,
+            "winch.drive.current_peak": torque * (winch.drive.current_peak or math.nan),
+        }
+    )
+
+
+def test_a_torque_limit_that_is_lower_than_told_is_learnt_and_told_of():
+    case, seconds = case_of("thesis-1975", 1.9), 80.0
+    true = off(case, torque=0.8)
+    controller = controller_of("thesis-1975", 1.9)
+    runs = sh.simulate(true, controller, seeds=[1], duration=seconds, settle=40.0)
+    told = run_of(LinearMPC(true, weights=WEIGHTS["thesis-1975"]), seconds)
+    run, peak = runs.runs[0], true.winch.drive.torque_peak
+    assert controller.window.peak == pytest.approx(peak, rel=0.03)
+    assert run.statistics.value("payload rms") < 1.5 * told.statistics.value("payload rms")
+    assert run.timings.statuses["derated"] == controller.counts["derated"] > 1000
+    assert any("less torque than its limits say" in event.text for event in run.events)
+    # One that is as told is not thought to be any less.
+    own = run_of(controller, seconds)
+    assert controller.counts["derated"] == 0
+    assert "derated" not in own.timings.statuses
+
+
+def test_a_peak_is_learnt_from_what_is_followed_for_some_samples_and_probed():
+    window, winch = controller_of("thesis-1975").window, controller_of("thesis-1975").model.winch
+    told = window.peak
+    asked = 0.2 * told / winch.gain  # left out, in volts
+
+    def follow(torque: float, left_out: float, speed: float = 0.0, samples: int = 1) -> float:
+        for _ in range(samples):
+            window.follow(torque * told, left_out, speed)
+        return window.peak / told
+
+    assert follow(0.8, asked, samples=2) == 1.0  # a spike
+    assert follow(0.8, 0.0) == 1.0
+    assert follow(0.1, asked, samples=9) == 1.0  # the brake
+    assert follow(-0.8, asked, samples=9) == 1.0  # more than asked, by another hand
+    assert follow(0.8, _NAN, samples=9) == follow(_NAN, asked, samples=9) == 1.0
+    assert follow(0.8, asked, 0.99 * window.limits.speed, samples=9) == 1.0  # near overspeed
+    assert follow(-0.8, -asked, samples=3) == pytest.approx(0.8)
+    assert window.derated
+    unit, low, high = told / 11_880.0, *window.bounds(0.0, np.zeros(9), math.inf)
+    rest = winch.rest_torque / told
+    assert high == pytest.approx(unit * (0.8 - rest))
+    assert low == pytest.approx(unit * (-0.8 - rest))
+    assert follow(0.5, 0.0, samples=99) == pytest.approx(0.8)  # tells nothing
+    assert 0.8 < follow(0.8, 0.0) < 0.82  # follows there: probed
+    assert follow(0.9, asked, samples=4) == pytest.approx(0.9)
+    assert follow(1.0, 0.0) == 1.0
+    assert not window.derated
+
+
+@pytest.mark.parametrize("inertia", [1.3, 0.7])
+def test_an_inertia_other_than_told_is_learnt_and_planned_with(inertia):
+    case, seconds = case_of("thesis-1975", 1.9), 120.0
+    true, weights = off(case, inertia=inertia), WEIGHTS["thesis-1975"]
+    controller = controller_of("thesis-1975", 1.9)
+    run = run_of(controller, seconds, case=true, settle=60.0)
+    told = run_of(LinearMPC(true, weights=weights), seconds, settle=60.0)
+    assert controller.inertia.ratio == pytest.approx(inertia, abs=0.03)
+    assert run.statistics.value("payload rms") < 2.0 * told.statistics.value("payload rms")
+    run_of(controller, 60.0)
+    assert controller.inertia.ratio == pytest.approx(1.0, abs=5e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [1.25, 1.9, 2.43, 3.75])
+def test_a_drive_that_is_not_as_told_costs_less_than_a_factor_of_two(height):
+    case, weights = case_of("thesis-1975", height), WEIGHTS["thesis-1975"]
+
+    def left(true: models.Case, known: models.Case) -> float:
+        controller = LinearMPC(known, weights=weights)
+        runs = sh.simulate(true, controller, seeds=3, duration=360.0, settle=60.0).runs
+        return math.sqrt(sum(run.statistics.value("payload rms") ** 2 for run in runs))
+
+    for other in ({"inertia": 1.3}, {"inertia": 0.7}, {"torque": 0.8}):
+        true = off(case, **other)
+        assert left(true, case) < 2.0 * left(true, true), other
+
+
+@pytest.mark.parametrize(
+    ("name", "error"), [("thesis-1975", 0.01), ("thesis-1975-rope", 0.01), ("subsea-crane", 0.1)]
+)
+def test_the_inertia_of_a_case_is_found_to_be_what_it_is(name, error):
+    controller = controller_of(name)
+    run_of(controller, 60.0)
+    assert controller.inertia.ratio == pytest.approx(1.0, abs=error)
 
 
 def test_a_set_point_that_is_no_number_keeps_its_place_and_the_estimate():

@@ -289,7 +289,7 @@ def test_the_bundled_crane_of_today_can_be_tuned():
 
 
 def test_a_drive_saturates_where_the_sea_asks_for_more_than_its_peak():
-    winches = [sampled_winch(case_of("thesis-1975", h)) for h in (0.5, 1.25)]
+    winches = [sampled_winch(case_of("thesis-1975", h)) for h in (0.25, 1.25)]
     assert [saturates(prediction_model(winch)) for winch in winches] == [False, True]
     assert not saturates(prediction_model(sampled_winch(case_of("subsea-crane"))))
 
