@@ -36,7 +36,7 @@ _LENGTHS = (1, 4, 12, 25, 50, 100, _TAPS)  # while the record is short
 _ERROR, _RATE_ERROR = 3e-3, 10.0  # floor of theirs over the hook's rms; the velocity's over that
 # A filter that has just begun, or whose sensors drift, is off slowly, below the waves' band: so far
 # over the hook's rms, at a density exp(-(omega t)^2 / 2) with a time t [s].
-_SLOW, _SETTLED, _SLOWNESS = 0.015, 0.002, 6.0
+_SLOW, _SETTLED, _SLOWNESS = 0.015, 0.0005, 6.0
 _SETTLING = 60.0  # [s], after which it has settled; all taps are used when it has for as long
 _PEAKS = np.geomspace(5.0, 18.0, 20)  # of seas of one system [s]
 _GAMMAS = (1.0, 3.3)

@@ -79,7 +79,7 @@ class SwitchedSignal:
 
     def extreme(self, duration: float, way: int = 1) -> float:
         """Return how far it most probably goes up (`way` 1) or down (-1) in a time [s]."""
-        moments = self._moments(way)
+        moments = self._moments[way]
         largest = 3.0 * self.loss + 9.0 * math.sqrt(moments[0, 0])
         if self.loss == 0.0:
             period = 2.0 * math.pi * math.sqrt(moments[0, 0] / moments[1, 1])
@@ -99,7 +99,7 @@ class SwitchedSignal:
         """Return how often it crosses a level upwards, or -level downwards [1/s]."""
         total = 0.0
         for turn in (1, -1):
-            moments, v = self._moments(turn * way), level - turn * self.loss
+            moments, v = self._moments[turn * way], level - turn * self.loss
             m0, m2, own, bend = (math.sqrt(one) for one in np.diag(moments))
             r = _correlation(turn * moments[0, 2], m0 * own)
             q = math.sqrt(1.0 - r * r)
@@ -113,13 +113,16 @@ class SwitchedSignal:
                 total += turn * float(_density(0.0)) / own * beyond
         return total
 
-    def _moments(self, way: int) -> FloatArray:
-        """Return covariances of C = A + s B, C', omega and omega', s by `way`, (4, 4)."""
-        s = 1j * self.nodes.omega
-        C = self.linear + way * self.carried
-        rows = np.stack([C, s * C, self.speed, s * self.speed])
-        weighed = rows * (self.densities * self.nodes.weights)
-        return np.asarray(np.einsum("iwk,jwk->ij", weighed.conj(), rows).real)
+    @cached_property
+    def _moments(self) -> dict[int, FloatArray]:
+        """Covariances of C = A + s B, C', omega and omega', (4, 4), by s, 1 or -1."""
+        found, s = {}, 1j * self.nodes.omega
+        for way in (1, -1):
+            C = self.linear + way * self.carried
+            rows = np.stack([C, s * C, self.speed, s * self.speed])
+            weighed = rows * (self.densities * self.nodes.weights)
+            found[way] = np.asarray(np.einsum("iwk,jwk->ij", weighed.conj(), rows).real)
+        return found
 
 
 def _correlation(covariance: float, product: float) -> float:
@@ -202,15 +205,20 @@ class SwitchedLoop:
 
     def _on_nodes(self, signals: tuple[str, ...]) -> tuple[Quadrature, FloatArray, ComplexArray]:
         """Return nodes, densities (w, k) and responses (o, w, k) of signals to all that shakes."""
-        nodes = self.loop.quadrature(list(dict.fromkeys(signals)))
+        nodes, densities, responses = self._known
+        at = [self.loop.plant.outputs.index(one) for one in signals]
+        return nodes, densities, responses[at]
+
+    @cached_property
+    def _known(self) -> tuple[Quadrature, FloatArray, ComplexArray]:
+        """Nodes for all outputs of the plant, densities and responses there."""
+        outputs = self.loop.plant.outputs
+        nodes = self.loop.quadrature(outputs)
         omega = nodes.omega
         densities = np.stack(
             [np.broadcast_to(self._density(i, omega), omega.shape) for i in range(len(self._names))]
         )
-        responses = np.array(
-            [[self.loop.response(one, name, omega) for name in self._names] for one in signals]
-        )
-        return nodes, densities, responses
+        return nodes, densities, self.loop.responses(outputs, self._names, omega)
 
     def _density(self, index: int, omega: FloatArray) -> FloatArray:
         if self._names[index] == SET_POINT and self._remnant is not None:

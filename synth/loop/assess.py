@@ -220,7 +220,7 @@ class Assessment:
 
     def response(self, output: str, disturbance: str, omega: FloatArray) -> ComplexArray:
         """Return the closed-loop response of `output` to `disturbance`, (k,)."""
-        return np.asarray(self._responses([output], [disturbance], omega)[0, 0])
+        return np.asarray(self.responses([output], [disturbance], omega)[0, 0])
 
     def sigma(self, output: str) -> float:
         """Return the standard deviation of `output`."""
@@ -400,7 +400,7 @@ class Assessment:
         powers = np.stack([np.ones_like(nodes.omega), nodes.omega**2])
         return np.asarray((powers @ (product * shares(nodes.omega)).T).real)
 
-    def _responses(
+    def responses(
         self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray
     ) -> ComplexArray:
         """Return the closed-loop responses of outputs to disturbances, (z, w, k)."""
@@ -441,7 +441,7 @@ class Assessment:
     def _all(self, outputs: Sequence[str], omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Return the responses of outputs to all disturbances, (z, w, k), and densities (w, k)."""
         densities = np.array([d.density(omega) for d in self.disturbances])
-        return self._responses(outputs, [d.name for d in self.disturbances], omega), densities
+        return self.responses(outputs, [d.name for d in self.disturbances], omega), densities
 
     def _gains(self, omega: FloatArray) -> ComplexArray:
         """Return L of each loop, (loops, k); with the losses first, then without."""
