@@ -177,12 +177,40 @@ def test_recursion_kernel_and_steps_from_python_agree(name: str, kind: str) -> N
 
 def test_a_set_point_that_is_no_number_keeps_its_place() -> None:
     case, T = load_case("thesis-1975"), 0.01
-    controller = operated(LinearFeedback(case, {"a": 0.0, "a1": 0.0, "a2": 100.0}), case)
+    controller = operated(LinearFeedback(case, {"a": 0.0, "a1": 0.0, "a2": 1.0}), case)
     rows = np.tile(still("thesis-1975"), (1500, 1))
     rows[:, AT["reference.displacement"]] = rows[:, AT["payload.displacement"]] = 0.4
     lost = rows.copy()
     lost[round(8.0 / T) :, AT["reference.displacement"]] = math.nan
+    rows[900:, AT["payload.displacement"]] = lost[900:, AT["payload.displacement"]] = 0.5
     assert (commands(controller, lost) == commands(controller, rows)).all()
+    assert controller.status in ("engaged", "limited")
+
+
+def test_no_number_does_not_stay_in_the_states_of_a_law() -> None:
+    controller, rows = made("thesis-1975", "feed-forward"), seen("thesis-1975", 900, seed=9)
+    rows[400:403, AT["mru.heave_rate"]] = math.nan
+    assert np.isfinite(commands(controller, rows)).all()
+    assert controller.status in ("engaged", "limited")
+
+
+def test_until_it_is_enabled_the_set_point_is_where_the_load_is() -> None:
+    asked: list[float] = []
+
+    class Heard(Stepped):
+        def step(self, measurement: Measurement, time: float) -> float:
+            asked.append(measurement["reference.displacement"])
+            return super().step(measurement, time)
+
+    controller = operated(Heard(law("thesis-1975", "feedback")), load_case("thesis-1975"), rate=0.1)
+    rows = np.tile(still("thesis-1975"), (2000, 1))
+    rows[:300, AT["operator.enable"]] = 0.0
+    rows[:, AT["payload.displacement"]], rows[:, AT["drum.haul"]] = 0.7, 0.5
+    commands(controller, rows)
+    assert asked[:301] == pytest.approx([0.7] * 301, abs=1e-9)
+    assert np.abs(np.diff(asked)).max() < 0.25 * 0.01
+    assert asked[800] == pytest.approx(0.5 - 0.1 * 5.0, abs=2e-3)
+    assert asked[-1] == 0.0
 
 
 def test_the_set_point_moves_at_the_operators_rate() -> None:
