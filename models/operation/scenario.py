@@ -9,6 +9,7 @@ Times count from the start of the run.  The payload's set-point is a displacemen
 hangs at rest at the start.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -40,6 +41,11 @@ class Scenario:
     settle: float = 0.0  #: Time from which statistics of the run count [s].
     #: When the controller begins to ramp out, after which the brake is set [s].
     disengage_at: float | None = None
+    #: Periods in which the operator enables the controller, which holds the drum before, between
+    #: and after them [s]; None for always.
+    enabled: tuple[Interval, ...] | None = None
+    resets: tuple[float, ...] = ()  #: When the operator resets the controller [s].
+    rate: float = math.inf  #: The operator's highest rate of the set point, when enabling it [m/s].
     #: Periods in which the brake is on although nobody asked for it [s].
     brake_trips: tuple[Interval, ...] = ()
     #: (start, end, lasting) [s]: the brake is on for so long from the moment between start and end
@@ -87,6 +93,11 @@ class Scenario:
             periods = getattr(self, name)
             checked = check_intervals(owner, name.replace("_", " "), periods, apart=True)
             object.__setattr__(self, name, checked)
+        if self.enabled is not None:
+            checked = check_intervals(owner, "enabled", self.enabled, apart=True)
+            object.__setattr__(self, "enabled", checked)
+        for time in self.resets:
+            check_range(owner, "time of a reset", time, low=0.0, unit="s")
         if self.worst_trip is not None:
             start, end, lasting = self.worst_trip
             check_range(owner, "start of worst_trip", start, low=0.0, unit="s")
@@ -121,6 +132,11 @@ class Scenario:
             found.append((self.warm_up, "engaged", "the brake opens and the controller engages"))
         if self.disengage_at is not None:
             found.append((self.disengage_at, "disengaged", "the controller ramps out"))
+        for start, end in self.enabled or ():
+            found.append((start, "enabled", "the operator enables the controller"))
+            if end < math.inf:
+                found.append((end, "disabled", "the operator disables the controller"))
+        found += [(at, "reset", "the operator resets the controller") for at in self.resets]
         for kind, what, periods in (
             ("brake", "the brake trips", self.brake_trips),
             ("telemetry", "the link from the payload is lost", self.telemetry_outages),

@@ -7,6 +7,7 @@ holding, engaging, moving the set-point, and what fails meanwhile; those with a 
 the surface are in `models.operation.contact_scenarios`.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,6 +23,7 @@ from .options import (
     WordOption,
     begin,
     length_option,
+    lowering_speed,
     move,
     moving,
     rope_left,
@@ -33,8 +35,16 @@ from .scenario import Scenario
 _AFTER = 240.0  # [s] in which a failure's consequences are seen
 
 
-def _hold(_: Case, values: Values) -> dict[str, Any]:
-    return {"duration": begin(values) + 1200.0, "settle": begin(values) + 60.0}
+def _hold(case: Case, values: Values) -> dict[str, Any]:
+    on, off, reset = (values[name] for name in ("engage", "disengage", "reset"))
+    begun = begin(values) + on
+    found = {"duration": begun + 1200.0, "settle": begun + 60.0}
+    if on > 0.0 or off < math.inf or reset < math.inf:
+        found |= {"enabled": ((on, off),), "rate": lowering_speed(case)}
+        found["resets"] = (reset,) if reset < math.inf else ()
+    if off < math.inf:
+        found["duration"] = off + values["ramp"] + 60.0
+    return found
 
 
 def _engage(_: Case, values: Values) -> dict[str, Any]:
@@ -102,7 +112,13 @@ _WAIT = time_option(120.0, "time before it")
 
 _RECIPES: Mapping[str, ScenarioRecipe] = {
     "hold": ScenarioRecipe(
-        description="hold station, the controller engaged from the start", build=_hold, options={}
+        description="hold station, the controller engaged from the start unless told otherwise",
+        build=_hold,
+        options={
+            "engage": time_option(0.0, "when the operator enables the controller"),
+            "disengage": time_option(math.inf, "when the operator disables it"),
+            "reset": time_option(math.inf, "when the operator resets it"),
+        },
     ),
     "engage": ScenarioRecipe(
         description="warm up with the brake on, engage, hold, disengage",

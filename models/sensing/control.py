@@ -26,7 +26,9 @@ from ..basics import FloatArray, InputError, check_finite, pick, read_only
 #: and `payload.valid` 1 where a message has just arrived.  `drive.applied` is the command that
 #: the drive has really followed over the last sample, within its limits; of a command that takes
 #: its time to the drive, the one asked for last as far as the drive is not at a limit.  The
-#: references are what the operator asks of the payload.
+#: references are what the operator asks of the payload: set point, its rate, and how that changes.
+#: `operator.enable` is 1 while the controller is to command the drive, `operator.reset` 1 where it
+#: is to forget all; encoder and load cell have no age, as they answer at once or not at all.
 HEARD: tuple[str, ...] = (
     "payload.acceleration",
     "payload.velocity",
@@ -44,7 +46,14 @@ HEARD: tuple[str, ...] = (
     "reference.displacement",
     "reference.velocity",
     "reference.acceleration",
+    "operator.enable",
+    "operator.reset",
+    "mru.age",
+    "encoder.valid",
+    "load_cell.valid",
 )
+
+_USUAL = ("operator.enable", "encoder.valid", "load_cell.valid")
 
 #: What a step of a controller may have been, and how a run tells of it; the first two are usual.
 STATUSES: Mapping[str, str] = MappingProxyType(
@@ -56,6 +65,8 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "derated": "the drive gives less torque than its limits say",
         "blind": "the controller has heard nothing of the payload for a second",
         "fallback": "the controller had no answer in time and fell back on a simpler law",
+        "blending": "",
+        "held": "the controller is not enabled and holds the drum",
     }
 )
 
@@ -64,7 +75,7 @@ _AT = {name: i for i, name in enumerate(HEARD)}
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measurement:
-    """One sample of what a controller sees, in the order of `HEARD`, (16,).
+    """One sample of what a controller sees, in the order of `HEARD`, (n,).
 
     It is not copied, as a loop makes thousands.
 
@@ -91,9 +102,12 @@ class Measurement:
     def of(cls, named: Mapping[str, float]) -> Measurement:
         """Return the measurement with these values, zero where none is given.
 
+        A controller is enabled, and hears encoder and load cell, unless it is said otherwise.
+
         Raises InputError if a name is unknown.
         """
         values = np.zeros(len(HEARD))
+        values[[_AT[name] for name in _USUAL]] = 1.0
         values[pick("measurement", "signal", HEARD, tuple(named))] = list(named.values())
         return cls(values)
 
@@ -102,11 +116,12 @@ class Measurement:
 class Controller(Protocol):
     """Anything that makes drive commands out of measurements.
 
-    Four attributes are optional: `recursion`, a `Recursion` that does what `step` does, lets
+    These are optional: `recursion`, a `Recursion` that does what `step` does, lets
     the whole loop be compiled; `brake`, true for a controller that holds the drum with its
     brake instead of its motor; `status`, one of `STATUSES`, says what the last step was;
+    `deaf_after`, the age of the payload's signals from which it is blind [s];
     `masses`, the masses along the rope on which it was found to hold, of which a simulation then
-    has as many.
+    has as many; `commanded(command)` tells it what went to the drive instead of its last command.
     """
 
     @property
@@ -131,14 +146,14 @@ class Controller(Protocol):
 class Recursion:
     """A controller as a function: (xc, m) -> (xc_next, u), a casadi.Function, from an initial xc.
 
-    The state xc is (nxc, 1) and may be empty; the measurements m are (16, 1), in the order of
-    `HEARD`.
+    The state xc is (nxc, 1) and may be empty; the measurements m are in the order of `HEARD`.
 
     Raises InputError if the function's shapes are others, or the initial state is not finite.
     """
 
     function: ca.Function
     initial: FloatArray
+    status: int | None = None  #: Which number of the state says what the step was, if one does.
 
     def __post_init__(self) -> None:
         initial = check_finite("recursion", "initial", self.initial)

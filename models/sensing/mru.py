@@ -53,12 +53,13 @@ _HILBERT = 60.0  # reach of the kernel that turns the phase, either way [s]
 class MruBlock(ReadOnlyArrays):
     """What the unit shows in a stretch of samples, (n,): heave [m] and heave rate [m/s].
 
-    They are held where `valid`, else 1, is 0.
+    They are held where `valid`, else 1, is 0; `age` is how old they are [s].
     """
 
     heave: FloatArray
     heave_rate: FloatArray
     valid: FloatArray
+    age: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,6 +74,7 @@ class MruState:
     #: Earlier heave and heave rate, oldest first, that are still on their way (lag, 2).
     past: FloatArray
     held: FloatArray  #: Heave and heave rate shown last (2,).
+    silent: int = 0  #: For how many samples they have been held.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,6 +283,7 @@ class MruModel:
         gone = during(self.outages, start + np.arange(n), self.sample_time)
         last = np.maximum.accumulate(np.where(gone, 0, np.arange(1, n + 1)))
         reported = np.vstack((state.held, delayed))[last]
+        silent = np.arange(1, n + 1) - np.where(last == 0, -state.silent, last)
         after = MruState(
             sample=start + n,
             last=read_only(true[-1]),
@@ -288,9 +291,12 @@ class MruModel:
             errors=tuple(modes_after),
             past=read_only(past),
             held=read_only(reported[-1]),
+            silent=int(silent[-1]),
         )
         valid = np.where(gone, 0.0, 1.0)
-        return MruBlock(heave=reported[:, 0], heave_rate=reported[:, 1], valid=valid), after
+        age = self.delay + self.sample_time * silent.astype(np.float64)
+        heave, rate = reported[:, 0], reported[:, 1]
+        return MruBlock(heave=heave, heave_rate=rate, valid=valid, age=age), after
 
     @property
     def _unit(self) -> MRU:

@@ -46,8 +46,9 @@ RAW = (
 #: Columns of the table of standard normal numbers that a run needs.
 NOISE = ("noise.acceleration", "noise.velocity", "noise.displacement", "noise.tension")
 _SENT = ("acceleration", "velocity", "displacement")
-_MRU = ("mru.heave", "mru.heave_rate", "mru.valid")
+_MRU = ("mru.heave", "mru.heave_rate", "mru.valid", "mru.age")
 _REFERENCE = ("reference.displacement", "reference.velocity", "reference.acceleration")
+_OPERATOR = ("operator.enable", "operator.reset")
 _ROUNDS = 100  # of Riccati's recursion, whose error falls at least to a third in each
 _ROUNDING = 1e-9  # of a sample and of a reading: as many of one make the other, whatever is rounded
 _SPEED_WINDOW = 0.01  # time over which a drive counts pulses for the speed [s]
@@ -126,6 +127,7 @@ class SensorModel:
             "telemetry.age",
             *_MRU,
             *_REFERENCE,
+            *_OPERATOR,
         )
 
     @staticmethod
@@ -146,14 +148,22 @@ class SensorModel:
         return draw(check_seed("sensors", seed), SENSOR_NOISE, start, count, len(NOISE))
 
     def rows(
-        self, noise: FloatArray, telemetry: TelemetryBlock, mru: MruBlock, references: FloatArray
+        self,
+        noise: FloatArray,
+        telemetry: TelemetryBlock,
+        mru: MruBlock,
+        references: FloatArray,
+        operator: FloatArray | tuple[float, float] = (1.0, 0.0),
     ) -> FloatArray:
         """Return the rows of a stretch of samples (n, len(row)) from what was drawn for them.
 
-        The references are displacement, velocity and acceleration asked of the payload (n, 3).
+        The references are displacement, velocity and acceleration asked of the payload (n, 3), the
+        operator's are enable and reset (n, 2).
         """
+        switches = np.broadcast_to(operator, (len(noise), 2))
         link = (telemetry.weights, telemetry.fresh, telemetry.valid, telemetry.age)
-        return np.column_stack((noise, *link, mru.heave, mru.heave_rate, mru.valid, references))
+        unit = (mru.heave, mru.heave_rate, mru.valid, mru.age)
+        return np.column_stack((noise, *link, *unit, references, switches))
 
     def initial(self, raw: npt.ArrayLike) -> FloatArray:
         """Return the state of sensors that have long seen values of `RAW` (8,) at rest."""
@@ -191,7 +201,9 @@ class SensorModel:
             "payload.valid": given["telemetry.valid"],
             "motor.torque": plant["motor.torque"],
             "drive.applied": applied,
-            **{name: given[name] for name in (*_MRU, *_REFERENCE)},
+            "encoder.valid": ca.SX(1.0),
+            "load_cell.valid": ca.SX(1.0),
+            **{name: given[name] for name in (*_MRU, *_REFERENCE, *_OPERATOR)},
         }
         for name in _SENT:
             true, drawn = plant[f"measured.{name}"], given[f"noise.{name}"]

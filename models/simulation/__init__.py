@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .closed_loop import STATUS
     from .kernel import Kernel
     from .simulate import Progress, run_simulation
     from .simulation import EASE, Simulation, SimulationOptions, prepare

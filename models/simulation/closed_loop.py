@@ -30,6 +30,7 @@ from .integrate import StepChoice, braked_step, disturbances
 from .rows import FLAGS
 
 HOOK = "hook"
+STATUS = "controller.status"
 _SATURATED = 1e-9  # relative difference of asked and applied command that is no rounding [-]
 _OWN = (
     "drive.hold",
@@ -85,6 +86,7 @@ def build_closed_loop(
     start: FloatArray,
     hold: float,
     recursion: Recursion | None = None,
+    with_status: bool = False,
 ) -> LoopRecursion:
     """Return the recursion of one control sample.
 
@@ -107,6 +109,8 @@ def build_closed_loop(
         Command that holds the load at rest, which an engaging controller is ramped in from.
     recursion
         The controller, if it is one.
+    with_status
+        Whether the log has the controller's status: one from Python gives it after its command.
     """
     waiting, share = late_hold(case.winch.drive.command_delay / step.sample_time)
     sends = waiting + 1 if waiting else 0  # what is remembered: up to what acted last
@@ -131,7 +135,7 @@ def build_closed_loop(
     # (The two kinds of symbol have the same methods; the type of one stands for both.)
     kind = cast("type[ca.SX]", ca.SX if step.substeps <= 2 else ca.MX)
     s, r = kind.sym("s", len(names)), kind.sym("r", columns)
-    p, asked = kind.sym("p", len(values)), kind.sym("u")
+    p, asked = kind.sym("p", len(values)), kind.sym("u", 1 + with_status)
     drive = nx + ns + sends  # where the last command is that the drive was told
     x, of_sensors, of_controller = s[:nx], s[nx : nx + ns], s[drive + 2 :]
     on_the_way, last, rise = s[nx + ns : drive], s[drive], s[drive + 1]
@@ -139,6 +143,7 @@ def build_closed_loop(
 
     look = _look(plant, sensors, tuple(values), len(motions))
     logged, signals = _log(plant, sensors, tuple(values), len(motions))
+    signals = (*signals, STATUS) if with_status else signals
     one_step = braked_step(plant, tuple(values), len(motions), step.step)
     raw, applied = look(x, last, moved, p)
 
@@ -152,8 +157,9 @@ def build_closed_loop(
     late = on_the_way[0] - arriving(on_the_way) if waiting else 0.0
     seen, m = sensors.function(of_sensors, raw, sensed, applied + late)
 
-    def sample(command: ca.SX, seen: ca.SX, controller: ca.SX) -> list[ca.SX]:
+    def sample(asked: ca.SX, seen: ca.SX, controller: ca.SX) -> list[ca.SX]:
         """Return the state after the sample and the log at its start."""
+        command = asked[0]
         sent = [command, *(ca.vertsplit(on_the_way) if waiting else ())]
         told = arriving(sent) if waiting else command
         u, warmer, log = logged(x, told, rise, moved, sensed, flags, p)
@@ -161,7 +167,8 @@ def build_closed_loop(
         for j in range(step.substeps):
             both = r[j * width : (j + 2) * width]
             after = one_step(after, u, both, flags[FLAGS.index("brake")], p)
-        return [ca.vertcat(after, seen, *sent[:sends], u, warmer, controller), log]
+        state = ca.vertcat(after, seen, *sent[:sends], u, warmer, controller)
+        return [state, ca.vertcat(log, asked[1]) if with_status else log]
 
     # With the controller inside nothing leaves the recursion in a sample; otherwise it is cut where
     # the measurement goes out and the command comes in.
@@ -169,6 +176,8 @@ def build_closed_loop(
     if recursion is not None:
         # The sensors see the plant before the command: a command acts on the sample it is made in.
         following, command = recursion.function(of_controller, m)
+        if with_status and recursion.status is not None:
+            command = ca.vertcat(command, following[recursion.status])
         functions = (_function("sample", [s, r, p], sample(command, seen, following)),)
     else:
         given = [s, ca.vertcat(r, asked), p]
@@ -243,7 +252,7 @@ def _log(
         "motor.temperature": rise,
         **{name: sensed[sensors.row.index(column)] for name, column in _FROM_ROW.items()},
         "brake.on": flag["brake"],
-        "engaged": flag["engaged"],
+        "engaged": flag["engaged"] * sensed[sensors.row.index("operator.enable")],
     }
     outputs = [ca.densify(v) for v in ca.cse([u, warmer, ca.vertcat(*log.values())])]
     return ca.Function("log", [x, asked, rise, moved, sensed, flags, p], outputs), tuple(log)

@@ -27,12 +27,15 @@ from typing_extensions import override
 from ..basics import FloatArray, SolverError, check_range, check_seed
 from ..run import Accumulator, Event, Run, Timings
 from ..sensing import STATUSES, Measurement, holds_brake
+from .closed_loop import STATUS
 from .simulation import Simulation
 from .trips import Watch, trip_limits
 
 Progress = Callable[[float], None]
 
 CHUNK = 8192  # samples between two looks at trips, Ctrl-C and progress
+_NAMES = tuple(STATUSES)
+_BLIND = _NAMES.index("blind")
 STORED = 40_000  # samples that a run keeps unless told otherwise
 Ran = tuple[FloatArray, FloatArray, Event | None]
 
@@ -156,6 +159,9 @@ class _Stepper:
     def __init__(self, simulation: Simulation) -> None:
         self._kernels = simulation.kernels
         self._signals = simulation.loop.signals
+        self._told = self._signals.index(STATUS) if STATUS in self._signals else None
+        self._age = self._signals.index("payload.age")
+        self._deaf = getattr(simulation.controller, "deaf_after", math.inf)
         self._sample_time = simulation.loop.sample_time
         limits = trip_limits(simulation.case)
         self.watch: Watch | None = Watch(limits, self._signals, self._sample_time)
@@ -172,11 +178,34 @@ class _Stepper:
         (kernel,) = self._kernels
         after, log = kernel.run(state, rows, parameters)
         found = None if self.watch is None else self.watch.trip(log, first)
-        if found is None:
-            return after, log, None
-        row, trip = found
-        # Once more, up to the sample where it happened.
-        return *kernel.run(state, rows[: row + 1], parameters), trip
+        trip = None
+        if found is not None:  # once more, up to the sample where it happened
+            row, trip = found
+            after, log = kernel.run(state, rows[: row + 1], parameters)
+        self._look(log, first)
+        return after, log, trip
+
+    def _look(self, log: FloatArray, first: int) -> None:
+        """Count what the steps of a controller in the loop were, and tell of the first."""
+        if self._told is None:
+            codes = np.where(log[:, self._age] > self._deaf, _BLIND, 0.0)
+        else:
+            codes = log[:, self._told]
+        if not codes.any():
+            return
+        for code in np.unique(codes[np.isfinite(codes)]):
+            rows = np.flatnonzero(codes == code)
+            time = (first + int(rows[0])) * self._sample_time
+            self._tell(_NAMES[int(code)], time, len(rows))
+
+    def _tell(self, status: str, time: float, count: int = 1) -> None:
+        """Count steps that were not as usual to the controller, and tell of the first."""
+        if not STATUSES.get(status):
+            return
+        if status not in self.statuses:
+            told = f"{STATUSES[status]} (told once)"
+            self.events.append(Event(time=time, kind="controller", text=told))
+        self.statuses[status] = self.statuses.get(status, 0) + count
 
 
 class _FromPython(_Stepper):
@@ -199,7 +228,8 @@ class _FromPython(_Stepper):
         for k, row in enumerate(rows):
             state, seen = measure.step(state, row, parameters)
             command = self._ask(Measurement(seen), (first + k) * self._sample_time)
-            state, log[k] = advance.step(state, np.append(row, command), parameters)
+            asked = (command,) if self._told is None else (command, _NAMES.index(self._status))
+            state, log[k] = advance.step(state, np.append(row, asked), parameters)
             found = None if self.watch is None else self.watch.trip(log[k : k + 1], first + k)
             if found is not None:
                 return state, log[: k + 1], found[1]
@@ -218,7 +248,7 @@ class _FromPython(_Stepper):
                 self._held("not a number", time, "the controller returned no number")
         taken = clock.perf_counter() - began
         self.seconds.append(taken)
-        self._tell(time)
+        self._tell(self._status, time)
         if taken > self._deadline:
             late = f"the controller took {1e3 * taken:.3g} ms"
             self._held("late", time, f"{late}, its deadline is {1e3 * self._deadline:.3g} ms")
@@ -226,15 +256,11 @@ class _FromPython(_Stepper):
             self._command = command
         return self._command
 
-    def _tell(self, time: float) -> None:
-        """Count a step that was not as usual to the controller, and tell of the first."""
-        status = getattr(self._controller, "status", "")
-        if not STATUSES.get(status):
-            return
-        if status not in self.statuses:
-            told = f"{STATUSES[status]} (told once)"
-            self.events.append(Event(time=time, kind="controller", text=told))
-        self.statuses[status] = self.statuses.get(status, 0) + 1
+    @property
+    def _status(self) -> str:
+        """What the last step was; as usual if the controller does not say, or not in our words."""
+        status = str(getattr(self._controller, "status", ""))
+        return status if status in STATUSES else _NAMES[0]
 
     def _held(self, kind: str, time: float, text: str) -> None:
         """Count a command that was not used, and tell of the first."""

@@ -270,6 +270,7 @@ def prepare(
     choice = _choose_step(plant, rest, values, sample_time, options.step, surroundings)
     sensors = SensorModel.from_case(case, sample_time, scenario.telemetry_delays)
     recursion = recursion_of(controller)
+    knows = hasattr(controller, "status") if recursion is None else recursion.status is not None
     loop = build_closed_loop(
         case,
         plant,
@@ -279,6 +280,7 @@ def prepare(
         start=_initial_state(plant, rest, scenario),
         hold=rest.command,
         recursion=recursion,
+        with_status=knows and (scenario.enabled is not None or bool(scenario.resets)),
     )
     return Simulation(
         case=case,

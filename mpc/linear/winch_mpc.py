@@ -294,6 +294,11 @@ class WinchMPC(ABC):
         self.solved: QPSolution | None = None
         self._answered = True  # whether the last step had its command of the programme
 
+    def commanded(self, command: float) -> None:
+        """Take note of what went to the drive instead of the last command."""
+        if self.model.winch.waiting:
+            self.estimator.given = command
+
     @abstractmethod
     def step(self, measurement: Measurement, time: float) -> float:
         """Return the drive command, its static part included [V, rad/s or N m]."""

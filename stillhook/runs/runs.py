@@ -228,6 +228,7 @@ def stays(scenario: Scenario) -> bool:
         scenario.profile.moves
         or scenario.surroundings is not None
         or scenario.disengage_at is not None
+        or scenario.enabled is not None
         or scenario.parameter_changes
         or scenario.brake_trips
         or scenario.worst_trip is not None

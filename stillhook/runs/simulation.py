@@ -23,6 +23,7 @@ from models.plant import MAX_MASSES, DriveLimits
 from models.run import Event, NamedQuantity, Run
 from models.sensing import Controller, holds_brake
 from models.simulation import Progress, Simulation, SimulationOptions, prepare, run_simulation
+from synth.controllers import operated
 from synth.design import Design, Tuning
 
 from ..controllers import controller_of
@@ -43,10 +44,16 @@ class Series:
     ) -> Series:
         """Prepare, the controller made for the scenario's own case (`Scenario.case_for`).
 
+        Where the operator enables or resets it, it gets the interface (`operated`).
+
         Raises InputError, SolverError as `models.simulation.prepare`.
         """
         if options.duration is not None:
             scenario = replace(scenario, duration=options.duration)
+        if scenario.enabled is not None or scenario.resets:
+            ramp = {"ramp": scenario.ramp} if scenario.ramp > 0.0 else {}
+            own = scenario.case_for(case)
+            controller = operated(controller, own, rate=scenario.rate, **ramp)
         simulation = prepare(case, controller, scenario, options)
         if options.lock_limit is None:
             simulation = simulation.with_options(lock_limit=_default_lock_limit(simulation))

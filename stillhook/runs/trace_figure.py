@@ -12,6 +12,8 @@ import numpy as np
 
 from models.basics import BoolArray, FloatArray, InputError, residual_text
 from models.run import ERROR, Event, Run
+from models.sensing import STATUSES
+from models.simulation import STATUS
 
 from ..text import (
     AFTER,
@@ -187,11 +189,14 @@ def _states(axes: Axes, run: Run, window: Window | None) -> None:
     def flag(name: str, limit: float) -> BoolArray:
         return run[name][rows] > limit if name in run else np.zeros(time.size, dtype=np.bool_)
 
+    usual = [tuple(STATUSES).index(name) for name in ("blending", "held")]
+    waits = np.isin(run[STATUS][rows], usual) if STATUS in run else np.zeros(0, dtype=np.bool_)
     late = run.case.sensors.telemetry.delay + 1.0
     states = (
         ("brake", flag("brake.on", 0.5), REFERENCE),
         ("no link", flag("payload.age", late), HOOK),
         ("saturated", flag("drive.saturated", 0.5), BROKEN),
+        *([("not engaged", waits, DRUM)] if STATUS in run else []),
     )
     for place, (_, values, colour) in enumerate(states):
         bars = [(start, end - start) for start, end in runs_of_true(time, values)]

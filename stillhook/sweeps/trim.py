@@ -8,6 +8,7 @@ controller keeps its model; command, motor torque and rope tension are told to i
 it, as deviations from a static state that is shifted to the true one.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -51,6 +52,7 @@ def trimmed(controller: Controller, shift: Shift) -> Controller:
         name=controller.name,
         sample_time=controller.sample_time,
         recursion=_shifted(recursion, shift),
+        deaf_after=getattr(controller, "deaf_after", math.inf),
     )
 
 

@@ -1,7 +1,7 @@
 """Controllers in time: designs, sampled, and the laws that the industry uses.
 
 A case comes in, with gains or a design where there is feedback; a controller that steps with the
-simulation goes out.
+simulation goes out.  `operated` puts the operator's interface about any controller.
 """
 
 from typing import TYPE_CHECKING
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .brake import BrakeOn
     from .constant_tension import ConstantTension
     from .feed_forward import VelocityFeedForward
+    from .interface import operated
     from .linear_feedback import LinearFeedback
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

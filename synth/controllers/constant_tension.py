@@ -167,7 +167,8 @@ class ConstantTension(RecursiveController):
 
     def _law(self, xc: ca.SX, m: Signals) -> tuple[ca.SX, ca.SX]:
         error, band = self.set_point - m["rope.tension"], self.dead_band * self.set_point
-        return self._respond(xc, m, ca.fmax(0, error - band) + ca.fmin(0, error + band), self.gain)
+        error = m["load_cell.valid"] * (ca.fmax(0, error - band) + ca.fmin(0, error + band))
+        return self._respond(xc, m, error, self.gain)
 
     def _respond(self, xc: ca.SX, m: Signals, error: ca.SX, gain: float) -> tuple[ca.SX, ca.SX]:
         """Return next state and command for a lack of tension [N]."""

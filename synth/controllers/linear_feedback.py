@@ -30,6 +30,7 @@ reference unit that is lost; it counts as nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -131,6 +132,9 @@ class LinearFeedback(RecursiveController):
             controller=controller,
             anti_windup=anti_windup and len(C[0]) > 0,
             hold_for=float(hold),
+            deaf_after=float(hold)
+            if set(MEASUREMENTS) & set(controller.measurements)
+            else math.inf,
             motor=SteadyMotion.of(plant.data),
             masses=masses,
         )
@@ -200,6 +204,8 @@ class LinearFeedback(RecursiveController):
         wanted |= {name: m[name.replace("payload", "reference")] for name in MEASUREMENTS}
         # A reference unit that is lost shows its last values: a heave rate that goes on for ever.
         trust = {**dict.fromkeys(MEASUREMENTS, fresh), **dict.fromkeys(HOOK, m["mru.valid"])}
+        trust |= dict.fromkeys(("drum.haul", "motor.speed"), m["encoder.valid"])
+        trust["rope.tension"] = m["load_cell.valid"]
         rows = []
         for name in self.controller.measurements:
             deviation = m[name] - wanted.get(name, 0.0)

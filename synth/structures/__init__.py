@@ -15,7 +15,14 @@ if TYPE_CHECKING:
     from .fixed import Fixed
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw
     from .lqg import LqgEstimator, LqgRegulator, estimator, reduced, regulator, shaped, weighing
-    from .recursive import RecursiveController, Signals, checked_sample_time, make_recursion
+    from .recursive import (
+        RecursiveController,
+        Signals,
+        Stepper,
+        checked_sample_time,
+        make_recursion,
+        signals_of,
+    )
     from .sampling import Matrices, SampledLoop, sampled, sampled_loop, tracking_gain
     from .structure import (
         Parameter,

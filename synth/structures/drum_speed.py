@@ -62,6 +62,7 @@ class SteadyMotion:
 
     inertia: float  #: J at the motor's shaft, the load not included [kg m2].
     torque_gain: float  #: kappa [N m per unit of the command].
+    torque_constant: float  #: Torque of a DC motor per current [N m/A]; infinite for an AC motor.
     damping: float  #: D [N m s/rad].
     #: How much of the motor's speed the motor itself takes from the command: K_omega [V s/rad] of a
     #: DC motor, 1 of a regulated AC motor, 0.
@@ -87,6 +88,7 @@ class SteadyMotion:
         return cls(
             inertia=data.inertia,
             torque_gain=gain,
+            torque_constant=data.torque_constant if data.motor == "dc" else math.inf,
             damping=data.viscous_friction + gain * own,
             own_gain=own,
             regulated=regulated,

@@ -8,6 +8,7 @@ evaluates that very function, so that a controller called from Python and one co
 simulation give the same commands.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,23 +19,31 @@ import numpy.typing as npt
 
 from models.basics import FloatArray, check_range
 from models.plant import OperatingPoint
-from models.sensing import HEARD, Measurement, Recursion
+from models.sensing import HEARD, STATUSES, Measurement, Recursion
 
 Signals = Mapping[str, ca.SX]
 RecursiveLaw = Callable[[ca.SX, Signals], tuple[ca.SX, ca.SX]]
 
 _SHORTEST, _LONGEST = 1e-4, 10.0  # sample times [s]
+_AGE = HEARD.index("payload.age")
 
 
-def make_recursion(initial: npt.ArrayLike, law: RecursiveLaw) -> Recursion:
+def signals_of(vector: ca.SX) -> dict[str, ca.SX]:
+    """Return the symbols of a vector by the names of `HEARD`, which it begins with."""
+    return {name: vector[i] for i, name in enumerate(HEARD)}
+
+
+def make_recursion(
+    initial: npt.ArrayLike, law: RecursiveLaw, *, status: int | None = None
+) -> Recursion:
     """Return the recursion of a law, from the state before the first sample, (nxc,).
 
     The law is called once, as law(state, measured) with symbols, `measured` by the names of
-    `HEARD`; it returns the next state, (nxc, 1), and the command.
+    `HEARD`; it returns the next state, (nxc, 1), of which `status` may be one, and the command.
     """
     start = np.atleast_1d(np.asarray(initial, dtype=np.float64))
     state, vector = ca.SX.sym("xc", start.size), ca.SX.sym("m", len(HEARD))
-    following, command = law(state, {name: vector[i] for i, name in enumerate(HEARD)})
+    following, command = law(state, signals_of(vector))
     function = ca.Function(
         "controller",
         [state, vector],
@@ -42,7 +51,7 @@ def make_recursion(initial: npt.ArrayLike, law: RecursiveLaw) -> Recursion:
         ["xc", "m"],
         ["xc_next", "u"],
     )
-    return Recursion(function=function, initial=start)
+    return Recursion(function=function, initial=start, status=status)
 
 
 def at_rest(point: OperatingPoint) -> Measurement:
@@ -58,35 +67,39 @@ def at_rest(point: OperatingPoint) -> Measurement:
     )
 
 
-class _Stepper:
-    """A recursion with a state: what changes while its controller stays the same."""
+class Stepper:
+    """A function (state, seen) -> (next state, made) with its state, which changes."""
 
-    def __init__(self, recursion: Recursion, state: FloatArray | None = None) -> None:
-        self._recursion = recursion
-        self._state = np.array(recursion.initial if state is None else state)
-        self._next, self._command = np.empty_like(self._state), np.empty(1)
-        self._seen = np.zeros(len(HEARD))
+    def __init__(
+        self, function: ca.Function, initial: FloatArray, state: FloatArray | None = None
+    ) -> None:
+        self._function, self._initial = function, initial
+        self.state = np.array(initial if state is None else state)
+        self._next, self._made = np.empty_like(self.state), np.empty(function.numel_out(1))
+        self.seen = np.zeros(function.numel_in(1))
         # The arrays' addresses are bound once: a call then costs a microsecond, not fifty.
         buffer: Any  # CasADi's stubs ask for an address and a size
-        buffer, self._evaluate = recursion.function.buffer()
-        given: tuple[Any, Any] = self._state, self._seen
-        made: tuple[Any, Any] = self._next, self._command
+        buffer, self._evaluate = function.buffer()
+        given: tuple[Any, Any] = self.state, self.seen
+        made: tuple[Any, Any] = self._next, self._made
         for i in (0, 1):
             buffer.set_arg(i, memoryview(given[i]))
             buffer.set_res(i, memoryview(made[i]))
         self._buffer = buffer  # which `evaluate` needs alive
 
     def reset(self) -> None:
-        self._state[:] = self._recursion.initial
+        """Return to the state at first."""
+        self.state[:] = self._initial
 
-    def step(self, values: FloatArray) -> float:
-        self._seen[:] = values
+    def run(self, values: FloatArray) -> FloatArray:
+        """Return what is made of values seen; the array is that of the next call too."""
+        self.seen[:] = values
         self._evaluate()
-        self._state[:] = self._next
-        return float(self._command[0])
+        self.state[:] = self._next
+        return self._made
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _Stepper, (self._recursion, self._state.copy())
+        return Stepper, (self._function, self._initial, self.state.copy())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,11 +116,13 @@ class RecursiveController:
     sample_time: float  #: Time from one step to the next [s], 0.0001 to 10.
     recursion: Recursion = field(repr=False)  #: The law.
     brake: bool = False  #: Whether the drum is held by its brake instead of the motor.
-    _stepper: _Stepper = field(init=False, repr=False)
+    deaf_after: float = math.inf  #: Age of the payload's signals from which it is blind [s].
+    _stepper: Stepper = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         checked_sample_time(self.name, self.sample_time)
-        object.__setattr__(self, "_stepper", _Stepper(self.recursion))
+        stepper = Stepper(self.recursion.function, self.recursion.initial)
+        object.__setattr__(self, "_stepper", stepper)
 
     def _set(self, **fields: object) -> None:
         """Set fields of a subclass that has an `__init__` of its own."""
@@ -118,10 +133,9 @@ class RecursiveController:
         self, name: str, sample_time: float, initial: npt.ArrayLike, law: RecursiveLaw
     ) -> None:
         """Set the fields of this class; the last thing that such an `__init__` does."""
-        checked_sample_time(name, sample_time)
         self._set(name=name, sample_time=float(sample_time))
         self._set(recursion=make_recursion(initial, law))
-        self._set(_stepper=_Stepper(self.recursion))
+        RecursiveController.__post_init__(self)
 
     def reset(self) -> None:
         """Forget every earlier measurement."""
@@ -130,7 +144,17 @@ class RecursiveController:
     def step(self, measurement: Measurement, time: float) -> float:
         """Return the drive command, its static part included [V, rad/s or N m]."""
         del time  # no law here depends on it
-        return self._stepper.step(measurement.values)
+        return float(self._stepper.run(measurement.values)[0])
+
+    @property
+    def status(self) -> str:
+        """What the last step was, as `models.sensing.STATUSES` has it.
+
+        A law without the interface (`synth.controllers.operated`) knows whether it is blind.
+        """
+        if self.recursion.status is not None:
+            return tuple(STATUSES)[int(self._stepper.state[self.recursion.status])]
+        return "blind" if self._stepper.seen[_AGE] > self.deaf_after else "engaged"
 
 
 def checked_sample_time(owner: str, sample_time: float) -> float:

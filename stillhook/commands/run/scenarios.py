@@ -1,6 +1,7 @@
 """`stillhook scenarios`: the operations and the controllers that can be simulated."""
 
 import argparse
+import math
 
 from models.basics import KINDS
 from models.operation import Option, WordOption, scenario_names, scenario_options
@@ -46,6 +47,8 @@ def _text(option: Option | WordOption) -> str:
 def _default(option: Option) -> str:
     if callable(option.default):
         return "follows from the case"
+    if option.default == math.inf:
+        return "never"
     unit = KINDS[option.quantity.kind].unit
     return quantity(option.default, unit) if unit else f"{option.default:g}"
 

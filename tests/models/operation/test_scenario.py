@@ -427,7 +427,7 @@ class TestLibrary:
             (
                 "hold",
                 {"speed": 1.0},
-                "scenario hold: there is no option 'speed'; there are: warm_up, ramp",
+                "scenario hold: there is no option 'speed'; there are: engage, disengage, reset, ",
             ),
             (
                 "lower",

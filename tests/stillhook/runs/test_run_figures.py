@@ -189,10 +189,10 @@ def test_the_torque_limit_is_drawn_where_it_is():
 def test_events_are_numbered_and_told():
     figure = figure_of("traces of a lost link")
     run = lost_link()[0]
-    (event,) = run.events
-    assert figure.get_supxlabel() == f"1  at {event}"
+    event, blind = run.events  # the link goes, and a second later the law is blind
+    assert figure.get_supxlabel() == f"1  at {event}\n2  at {blind}"
     first = figure.axes[0]
-    assert [text.get_text() for text in first.texts] == ["1"]
+    assert [text.get_text() for text in first.texts] == ["1", "2"]
     assert any(list(line.get_xdata()) == [event.time] * 2 for line in first.get_lines())
 
 

@@ -216,8 +216,8 @@ def test_a_sample_time_out_of_range_is_told(make: object, wrong: float) -> None:
 
 
 def test_measurements_go_by_their_names() -> None:
-    m = Measurement(np.arange(16.0))
-    assert [m[name] for name in HEARD] == list(range(16))
+    m = Measurement(np.arange(float(len(HEARD))))
+    assert [m[name] for name in HEARD] == list(range(len(HEARD)))
     with pytest.raises(InputError, match=r"no signal 'payload'; there are: payload\.acc"):
         m["payload"]
     with pytest.raises(InputError, match="no signal 'heave'"):
@@ -227,10 +227,10 @@ def test_measurements_go_by_their_names() -> None:
 def test_a_recursion_of_another_shape_is_told() -> None:
     xc, m = ca.SX.sym("xc", 2), ca.SX.sym("m", 15)
     f = ca.Function("f", [xc, m], [xc, xc[0]])
-    text = r"must take \[2, 16\] and return \[2, 1\] numbers .* got \[2, 15\] and \[2, 1\]"
+    text = rf"must take \[2, {len(HEARD)}\] and return \[2, 1\] numbers .* got \[2, 15\] and"
     with pytest.raises(InputError, match=text):
         Recursion(function=f, initial=np.zeros(2))
-    m = ca.SX.sym("m", 16)
+    m = ca.SX.sym("m", len(HEARD))
     with pytest.raises(InputError, match="initial must be finite numbers, got nan at index 1"):
         Recursion(function=ca.Function("f", [xc, m], [xc, xc[0]]), initial=[0.0, math.nan])
 
