@@ -13,5 +13,6 @@ if TYPE_CHECKING:
     from .constant_tension import ConstantTension
     from .feed_forward import VelocityFeedForward
     from .linear_feedback import LinearFeedback
+    from .touch_down import touching_down
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)
