@@ -32,6 +32,7 @@ DESIGNS = DATA / "landing_designs.csv"
 
 TOLERANCE = 0.04  # University of Agder, MAS409 [m]
 SEEDS = 20
+FEWER = {"nonlinear-mpc": 8}  # of what takes long
 SETTLED = 10.0  # after the set-point has come to rest, before the payload counts as held [s]
 
 PERFECT_MRU: Mapping[str, object] = {
@@ -103,6 +104,7 @@ def _share(share: float, *, lead: bool = False) -> Maker:
 # The controllers, and what is asked of each to see what limits it: changes of the case, and who.
 CONTROLLERS: Mapping[str, tuple[Mapping[str, object], Maker]] = {
     "mpc": ({}, sh.LinearMPC),
+    "nonlinear-mpc": ({}, sh.NonlinearMPC),
     "combined": ({}, partial(_designed, "combined")),
     "drum-feedback": ({}, partial(_designed, "drum-feedback")),
     "payload-feedback-rolloff": ({}, partial(_designed, "payload-feedback-rolloff")),
@@ -129,6 +131,13 @@ LIMITS: Mapping[str, tuple[Mapping[str, object], Maker]] = {
     "feed-forward of 1, MRU of 1 cm": (GOOD_MRU, _share(1.0)),
     "feed-forward of 1, MRU that drifts by 5 cm": (DRIFTING_MRU, _share(1.0)),
 }
+# Who is landed with the other touch-down phases too, and without: `mpc, touchdown none`.
+_OTHERS = (", touchdown none", ", touchdown tension")
+PHASES = tuple(
+    f"{name}{other}"
+    for name in ("mpc", "nonlinear-mpc", "combined", "feed-forward")
+    for other in _OTHERS
+)
 
 
 @cache
@@ -141,14 +150,22 @@ def made(name: str) -> tuple[sh.Case, Controller]:
 
 def runs_of(name: str, seeds: int | Sequence[int]) -> sh.Runs:
     """Return the runs of a row's controller, with their traces."""
-    return sh.simulate(*made(name), scenario="landing", seeds=seeds)
+    own, _, mode = name.partition(", touchdown ")
+    options = {"touchdown": mode} if mode else {}
+    return sh.simulate(*made(own), scenario="landing", seeds=seeds, options=options)
+
+
+def seeds_of(name: str) -> int:
+    """Return how many seeds a row's controller meets."""
+    return FEWER.get(name.partition(", touchdown ")[0], SEEDS)
 
 
 def rows_of(name: str, seeds: int | Sequence[int]) -> list[Row]:
     """Return a row for each seed, in SI units; NaN is what did not happen.
 
     ``within`` is the share of the time in which the payload is held that it is within the
-    tolerance, ``rms`` and ``largest`` are of its error then.  ``bounce`` and ``lifted`` say how
+    tolerance, ``rms`` and ``largest`` are of its error then, ``minute_before`` is the rms of the
+    error in the minute before touchdown.  ``bounce`` and ``lifted`` say how
     high it is above the seabed after touchdown, until the controller is disengaged and from then
     on, ``touchdowns`` how often it comes down, ``hardest`` how fast at most.  ``snap_load`` is the
     largest tension after slack, ``end_haul`` minus the rope that is out in the end.
@@ -179,6 +196,7 @@ def numbers(run: sh.Run, scenario: sh.Scenario) -> dict[str, float]:
         "within": float(np.mean(np.abs(error) <= TOLERANCE)),
         "rms": float(np.sqrt(np.mean(error**2))),
         "largest": float(np.abs(error).max()),
+        "minute_before": minute_before(run),
         "touchdown_speed": found.value("touch-down speed"),
         "bounce": _highest(run["contact.gap"][landed & engaged]),
         "lifted": _highest(run["contact.gap"][landed & ~engaged]),
@@ -190,15 +208,23 @@ def numbers(run: sh.Run, scenario: sh.Scenario) -> dict[str, float]:
     }
 
 
+def minute_before(run: sh.Run) -> float:
+    """Return the rms of the payload's error in the minute before touchdown [m]."""
+    error = run["payload.displacement"] - run["reference.displacement"]
+    at = run.statistics.value("touch-down at")
+    near = (run.time < at) & (run.time >= at - 60.0)
+    return float(np.sqrt(np.mean(error[near] ** 2))) if near.any() else math.nan
+
+
 def _highest(gap: np.ndarray) -> float:
     return float(gap.max(initial=0.0)) if gap.size else math.nan
 
 
-def study(tell: Callable[[str], None] = lambda text: None, seeds: int = SEEDS) -> list[Row]:
-    """Return all rows."""
+def study(tell: Callable[[str], None] = lambda text: None, most: int = SEEDS) -> list[Row]:
+    """Return all rows, of at most so many seeds."""
     rows = []
-    for name in (*CONTROLLERS, *LIMITS):
-        rows += rows_of(name, seeds)
+    for name in (*CONTROLLERS, *LIMITS, *PHASES):
+        rows += rows_of(name, min(most, seeds_of(name)))
         tell(f"{name}: {1e3 * mean(rows, name, 'rms').mean:.1f} mm")
     return rows
 

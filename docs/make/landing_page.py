@@ -13,12 +13,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import landing
-from landing import CONTROLLERS, LIMITS, SETTLED, TOLERANCE, Row, mean, values
+from landing import CONTROLLERS, FEWER, LIMITS, PHASES, SETTLED, TOLERANCE, Row, mean, values
 from stored import docs_folder, read_rows, study_parser
 
 import stillhook as sh
 from models.basics import Interval
-from models.operation import Scenario, scenario_named
+from models.operation import scenario_named
+from models.plant import PlantData
 
 PAGE = Path(__file__).resolve().parents[1] / "landing.md"
 FIGURE = PAGE.parent / "images" / "landing.svg"
@@ -92,12 +93,6 @@ def landers(rows: Iterable[Row]) -> list[str]:
     return [name for name in by_stillness(rows) if name in every]
 
 
-def beyond(rows: Iterable[Row], name: str, scenario: Scenario) -> float:
-    """Return how much more rope than asked is out when the brake is set, the mean over runs [m]."""
-    asked = -sum(move.distance for move in scenario.profile.moves)
-    return -mean(rows, name, "end_haul").mean - asked
-
-
 def held_table(rows: Sequence[Row], names: Iterable[str]) -> str:
     """Return how still the payload is held, as Markdown."""
     head = ["controller", "time within 4 cm [%]", "rms [mm]", "largest [mm]", "never beyond 4 cm"]
@@ -130,36 +125,52 @@ def designs_table(rows: Sequence[Row], designs: Iterable[Mapping[str, str]]) -> 
     return _table(head, body)
 
 
-def landed_table(rows: Sequence[Row], scenario: Scenario) -> str:
+def landed_table(rows: Sequence[Row], names: Iterable[str]) -> str:
     """Return how the payload lands, as Markdown."""
-    head = ["controller", "touchdown speed [mm/s]", "fastest [mm/s]", "off again [mm]"]
-    head += ["rope beyond what is asked [m]", "lifted on the brake", "hardest [mm/s]"]
-    head += ["slack events", "runs with a snap", "largest snap load [kN]"]
+    head = ["controller", "minute before, rms [mm]", "touchdown speed [mm/s]", "fastest [mm/s]"]
+    head += ["touchdowns", "hardest [mm/s]", "off again [mm]", "slack events"]
+    head += ["runs with a snap", "largest load after slack [kN]"]
     body = []
-    for name in landers(rows):
-        snaps = [v for v in values(rows, name, "snap_load") if not math.isnan(v)]
+    for name in names:
+        loads = [v for v in values(rows, name, "snap_load") if not math.isnan(v)]
         speeds = values(rows, name, "touchdown_speed")
         body.append(
             [
                 name,
+                _text(mean(rows, name, "minute_before"), 1e3, 1),
                 _text(mean(rows, name, "touchdown_speed"), 1e3),
                 f"{1e3 * max(speeds):.0f}",
-                _text(mean(rows, name, "bounce"), 1e3),
-                _digits(beyond(rows, name, scenario), 1),
-                lifted(rows, name),
+                f"{mean(rows, name, 'touchdowns').mean:.1f}",
                 f"{1e3 * max(values(rows, name, 'hardest')):.0f}",
+                f"{1e3 * most_off(rows, name):.0f}",
                 f"{mean(rows, name, 'slack_events').mean:.1f}",
-                f"{len(snaps)} of {len(speeds)}",
-                f"{max(snaps) / 1e3:.0f}" if snaps else "-",
+                f"{snaps(rows, name)} of {len(speeds)}",
+                f"{max(loads) / 1e3:.0f}" if loads else "-",
             ]
         )
     return _table(head, body)
 
 
-def lifted(rows: Sequence[Row], name: str) -> str:
-    """Return in how many runs the module is lifted again after the controller, in words."""
-    heights = values(rows, name, "lifted")
-    return f"{sum(v > LIFTED for v in heights)} of {len(heights)}"
+def snaps(rows: Iterable[Row], name: str) -> int:
+    """Return in how many runs a rope that was slack takes more than the load at rest."""
+    static = sh.load_case("landing").static_tension
+    return sum(load > static for load in values(rows, name, "snap_load"))
+
+
+def most_off(rows: Sequence[Row], name: str) -> float:
+    """Return how far a payload that had touched down was off the seabed again, at most [m]."""
+    heights = [*values(rows, name, "bounce"), *values(rows, name, "lifted")]
+    return max((height for height in heights if not math.isnan(height)), default=0.0)
+
+
+def with_phases() -> list[str]:
+    """Return the names of `PHASES`, each controller's together and with the default in its row."""
+    own = dict.fromkeys(name.partition(", touchdown ")[0] for name in PHASES)
+    return [
+        name
+        for each in own
+        for name in (f"{each}, touchdown none", each, f"{each}, touchdown tension")
+    ]
 
 
 def verdict(rows: Sequence[Row]) -> str:
@@ -188,13 +199,14 @@ def page(rows: Sequence[Row], designs: Sequence[Mapping[str, str]]) -> str:
     spare = -(down.distance + touch.distance) - below
     answer = designs[-1]["structure"]
     seeds = len(values(rows, "mpc", "rms"))
+    phase = scenario.touch_down
+    without, nonlinear = (f"{name}, touchdown none" for name in ("mpc", "nonlinear-mpc"))
+    taut = [name for name in PHASES if name.endswith("tension")]
+    fewer = ", ".join(f"{len(values(rows, name, 'rms'))} seeds of `{name}`" for name in FEWER)
+    sigma = case.sensors.mru.noise_floor / PlantData.from_case(case).chain_compliance
 
     def left(name: str) -> str:
         return mm(rows, name)
-
-    def rope(name: str) -> str:
-        more = beyond(rows, name, scenario)
-        return f"{abs(more):.1f} m {'more' if more > 0.0 else 'less'}"
 
     def most(name: str, number: str) -> float:
         return max(v for v in values(rows, name, number) if not math.isnan(v))
@@ -221,10 +233,11 @@ runs = sh.simulate(case, "feed-forward", scenario="landing", seeds=2)
 print(runs)
 ```
 
-Below are all controllers, {seeds} seeds each: means over the seeds, with their 95 % intervals.
-`mpc` is `sh.LinearMPC(case)`. `sh.optimise_gains(case)` answers with `{answer}`; the other
-structures that it looks at are here too, `feed-forward, designed` among them. `feed-forward` itself
-pays out 0.9 of the hook's speed, and *lowered without compensation* nothing of it.
+Below are all controllers, {seeds} seeds each ({fewer}): means over the seeds, with their 95 %
+intervals. `mpc` is `sh.LinearMPC(case)`, `nonlinear-mpc` is `sh.NonlinearMPC(case)`.
+`sh.optimise_gains(case)` answers with `{answer}`; the other structures that it looks at are here
+too, `feed-forward, designed` among them. `feed-forward` itself pays out 0.9 of the hook's speed,
+and *lowered without compensation* nothing of it.
 
 ## Holding it above the seabed
 
@@ -271,28 +284,52 @@ What stands in the way, the gains as they are:
 
 ## Setting it down
 
-{landed_table(rows, scenario)}
-
 The set-point goes down at {1e3 * touch.speed:.0f} mm/s, to {spare:g} m of rope more than reach the
-seabed. There the controller is ramped out and the brake set. *Off again* is how far the module
-leaves the seabed before that, and *lifted on the brake* counts the runs in which the hook takes it
-up afterwards; the *hardest* touchdown is of any of these. Slack comes with the rope that is paid
-out on top; a second slack event is the hook taking the rope up again, and the snap load is what
-follows, blunted by the few masses of the rope.
+seabed. No controller knows of the seabed; the touch-down phase of the scenario does. Once the
+tension at the drum lacks {phase.unloaded:g} of the load's weight for {phase.unloaded_for:g} s, with
+the set-point on its last way down, the winch no longer does what the controller wants:
 
-No controller here knows of the seabed.
+* `touchdown=release`, the default: it pays out at {phase.speed:.2f} m/s until the rope is slack by
+  {phase.slack:g} m with the hook in the middle of its motion. There the drum stands still, and the
+  brake is set.
+* `touchdown=tension`: it pays out as the hook rises and keeps {phase.kept_tension:g} of the weight
+  in the rope by constant tension, as far from slack as from lifting, as long as it runs.
+* `touchdown=none`: the controller goes on until the set-point is down, then the brake is set.
 
-* *Feedback* has to be switched off at touchdown. It goes on lowering a module that cannot go lower:
-  when the brake is set `{answer}` has paid out {rope(answer)} rope than it is asked to,
-  `payload-feedback-rolloff` {rope("payload-feedback-rolloff")}.
-* *MPC* puts the module down at {1e3 * mean(rows, "mpc", "touchdown_speed").mean:.0f} mm/s and at
-  most {1e3 * most("mpc", "touchdown_speed"):.0f}, but what follows is not for it. It goes on
-  following the hook, the rope is slack {mean(rows, "mpc", "slack_events").mean:.0f} times a run,
-  and when the brake is set there is {rope("mpc")} rope out than it is asked for. The hook then
-  lifts the module again in {lifted(rows, "mpc")} runs, by up to {most("mpc", "lifted"):.1f} m, and
-  sets it down at up to {most("mpc", "hardest"):.1f} m/s; snap loads go up to
-  {most("mpc", "snap_load") / 1e3:.0f} kN, where the module weighs
-  {case.payload.submerged_weight / 1e3:.0f} kN.""")
+```console
+$ stillhook simulate landing --scenario landing --controller feed-forward --option touchdown=tension
+```
+
+`unloaded`, `unloaded_for`, `kept_tension`, `release_speed` and `slack` are options too; `set-down`
+has them for a deck. The command has no bump where the phase begins, and until then nothing is
+changed by it. `synth.controllers.touching_down` puts it around any controller.
+
+All controllers with the default phase:
+
+{landed_table(rows, landers(rows))}
+
+*Off again* is how far the module leaves the seabed once it has touched it, the *hardest* touchdown
+is of all. A *snap* is a tension above the {case.static_tension / 1e3:.0f} kN of the load at rest
+in a rope that was slack, blunted by the few masses of the rope.
+
+With and without the phase ({fewer}):
+
+{landed_table(rows, with_phases())}
+
+* *Without the phase* MPC puts the module down at
+  {1e3 * mean(rows, "mpc", "touchdown_speed").mean:.0f} mm/s, but what follows is not for it: it
+  goes on following the hook, the rope is slack
+  {mean(rows, without, "slack_events").mean:.0f} times a run, the hook lifts the module again by
+  up to {most_off(rows, without):.1f} m and sets it down at up to
+  {most(without, "hardest"):.1f} m/s; tension goes up to {most(without, "snap_load") / 1e3:.0f} kN.
+  Nonlinear MPC: {most(nonlinear, "snap_load") / 1e3:.0f} kN.
+* *Released*, there is a snap in {sum(snaps(rows, name) for name in landers(rows))} of
+  {sum(len(values(rows, name, "snap_load")) for name in landers(rows))} runs of all controllers. The
+  first touchdown is as hard as before, for it is what begins the phase.
+* *Kept taut*, there is a snap in {sum(snaps(rows, name) for name in taut)} of
+  {sum(len(values(rows, name, "snap_load")) for name in taut)} runs. What is left of the tension's
+  variation is the error of the motion reference unit, which a rope of 350 m turns into
+  some {sigma / 1e3:.0f} kN.""")
 
 
 def figure(kind: str = "svg", seed: int = 0) -> bytes:
@@ -303,8 +340,8 @@ def figure(kind: str = "svg", seed: int = 0) -> bytes:
         "mpc": AFTER,
         "combined": DRUM,
         "feed-forward": HOOK,
-        "lowered without compensation": BEFORE,
     }
+    phases = {"none": BEFORE, "release": AFTER, "tension": DRUM}
     with styled():
         drawn = new_figure(9.0, 3.8)
         holding, touching = drawn.subplots(1, 2)
@@ -312,20 +349,28 @@ def figure(kind: str = "svg", seed: int = 0) -> bytes:
             (run,) = landing.runs_of(name, [seed])
             error = 1e3 * (run["payload.displacement"] - run["reference.displacement"])
             kept = (run.time >= 75.0) & (run.time <= 133.0)
-            if colour != BEFORE:  # that is ten times as much
-                holding.plot(run.time[kept][::5], error[kept][::5], color=colour, lw=1.3)
-            near = (run.time >= 150.0) & (run.time <= 200.0)
-            height = run["contact.gap"][near]
-            touching.plot(run.time[near], height, color=colour, lw=1.3, label=name)
+            holding.plot(run.time[kept][::5], error[kept][::5], color=colour, lw=1.3, label=name)
         for edge in (-1e3 * TOLERANCE, 1e3 * TOLERANCE):
             holding.axhline(edge, color=REFERENCE, lw=0.8, ls="--")
-        holding.set(xlabel="time [s]", ylabel="error [mm]", title="Held 5 m above the seabed")
+        holding.set(xlabel="time [s]", ylabel="error [mm]", ylim=(-225.0, 190.0))
+        holding.set_title("Held 5 m above the seabed")
         holding.annotate(
             "4 cm", (75.0, 1e3 * TOLERANCE), (0.0, 3.0), textcoords="offset points", fontsize=9.0
         )
-        touching.axhline(0.0, color=REFERENCE, lw=0.8)
-        touching.set(xlabel="time [s]", ylabel="above the seabed [m]", title="Set down")
-        drawn.legend(loc="outside lower center", ncols=len(shown))
+        for mode, colour in phases.items():
+            name = "mpc" if mode == "release" else f"mpc, touchdown {mode}"
+            (run,) = landing.runs_of(name, [seed])
+            near = (run.time >= 155.0) & (run.time <= 215.0)
+            tension = run["rope.tension"][near] / 1e3
+            touching.plot(run.time[near], tension, color=colour, lw=1.0, label=mode)
+        touching.set(
+            xlabel="time [s]",
+            ylabel="tension at the drum [kN]",
+            title="Set down by mpc",
+            ylim=(-7.0, 165.0),
+        )
+        holding.legend(loc="lower center", ncols=len(shown), fontsize=8.0)
+        touching.legend(loc="upper right", ncols=len(phases), fontsize=8.0)
     return picture(drawn, kind)
 
 

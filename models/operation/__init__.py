@@ -19,5 +19,6 @@ if TYPE_CHECKING:
     from .scenarios import scenario_named, scenario_names, scenario_options
     from .schedule import Schedule
     from .six_dof import tip_heave
+    from .touch_down import TouchDown
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

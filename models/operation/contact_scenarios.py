@@ -23,6 +23,7 @@ from ..plant import Deck, PlantData, Seabed, SplashZone, Surroundings
 from ..vessel import HeaveRao
 from .excitation import HOOK, SECOND_BODY, MotionSource, SpectrumMotion
 from .options import (
+    Default,
     Option,
     ScenarioRecipe,
     Values,
@@ -39,9 +40,10 @@ from .options import (
     wave_height,
     weight_in_air,
 )
+from .touch_down import MODES, TouchDown
 
 
-def _landing(_: Case, values: Values) -> dict[str, Any]:
+def _landing(case: Case, values: Values) -> dict[str, Any]:
     height, stop = values["height"], values["stop"]
     if stop >= height:
         raise InputError(
@@ -57,7 +59,35 @@ def _landing(_: Case, values: Values) -> dict[str, Any]:
         # for ever.
         "disengage_at": touch.end,
         "surroundings": Surroundings(ground=seabed),
+        **_touching_down(
+            values,
+            touch.end,
+            case.payload.submerged_weight * PlantData.from_case(case).chain_compliance,
+            armed_below=stop - height,
+            slack=values["slack"],
+        ),
     }
+
+
+def _touching_down(
+    values: Values, end: float, stretch: float, armed_below: float, slack: float
+) -> dict[str, Any]:
+    """Return the touch-down phase of a scenario whose set-point is down at a time [s], if any.
+
+    The load stretches the chain by so much [m], which has to be paid out as well as the slack.
+    A drum that has paid out slack is left to its brake; a rope that is kept taut needs the drive.
+    """
+    if values["touchdown"] == "none":
+        return {}
+    own = TouchDown(
+        mode=values["touchdown"],
+        slack=slack,
+        speed=values["release_speed"],
+        armed_below=armed_below,
+        **{name: values[name] for name in ("unloaded", "unloaded_for", "kept_tension")},
+    )
+    released = end + (own.slack + stretch) / own.speed
+    return {"touch_down": own, "disengage_at": released if own.mode == "release" else None}
 
 
 def _lift_off(case: Case, values: Values) -> dict[str, Any]:
@@ -78,7 +108,18 @@ def _compliance(case: Case, values: Values) -> float:
 
 def _set_down(case: Case, values: Values) -> dict[str, Any]:
     down = move(values, -values["height"] - values["slack"])
-    return {**moving(down), **_on_deck(case, values, values["height"])}
+    return {
+        **moving(down),
+        **_on_deck(case, values, values["height"]),
+        **_touching_down(
+            values,
+            down.end,
+            weight_in_air(case) * _compliance(case, values),
+            armed_below=0.0,
+            # A boat that takes the load on a crest sinks away from under it.
+            slack=values["slack"] * (1.0 if values["deck"] == "platform" else 2.0),
+        ),
+    }
 
 
 def _on_deck(case: Case, values: Values, below: float) -> dict[str, Any]:
@@ -132,6 +173,27 @@ _DECK: Mapping[str, Option | WordOption] = {
     "rope": length_option(40.0, "rope from the drum to the payload at the start", low=1.0),
 }
 
+_SHARE = Quantity("ratio", 0.0, 1.0, open_low=True)
+
+
+def _touch_down_options(speed: Default) -> dict[str, Option | WordOption]:
+    return {
+        "touchdown": WordOption(
+            words=(*MODES, "none"), text="what the winch does once the ground has the load"
+        ),
+        "unloaded": Option(
+            quantity=_SHARE, default=0.3, text="lack of tension, of the weight, that is a touchdown"
+        ),
+        "unloaded_for": Option(
+            quantity=Quantity("time", 0.0, 60.0), default=0.2, text="how long it must be lacking"
+        ),
+        "kept_tension": Option(
+            quantity=_SHARE, default=0.5, text="tension that is kept, of the weight"
+        ),
+        "release_speed": speed_option(speed, "speed at which slack is paid out"),
+    }
+
+
 CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
     "landing": ScenarioRecipe(
         description="lower the payload to above the seabed, wait, and land it",
@@ -155,6 +217,7 @@ CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
                 default=6.5e5,
                 text="damping of the seabed [N s/m^1.5]",
             ),
+            **_touch_down_options(lowering_speed),
             **set_point_options(),
         },
         ramp=2.0,
@@ -179,6 +242,7 @@ CONTACT_SCENARIOS: Mapping[str, ScenarioRecipe] = {
             "height": length_option(5.0, "height of the payload above the deck at the start"),
             "slack": length_option(wave_height, "rope paid out beyond the deck's mean height"),
             **_DECK,
+            **_touch_down_options(lifting_speed),
             **set_point_options(lifting_speed, 0.5),
         },
     ),

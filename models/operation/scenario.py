@@ -23,6 +23,7 @@ from ..plant import Surroundings
 from ..sensing import BIAS, LATE, Bias, Interval, Late, check_intervals
 from .excitation import MotionSource
 from .profile import Profile
+from .touch_down import TouchDown
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,6 +66,9 @@ class Scenario:
     #: parameter back to its own value.
     parameter_changes: Mapping[float, Mapping[str, float | None]] = field(default_factory=dict)
     surroundings: Surroundings | None = None  #: What the payload meets.
+    #: What the winch does when the ground takes the load; its controller must know of it
+    #: (`synth.controllers.touching_down`).
+    touch_down: TouchDown | None = None
     #: Sources of the motions that the surroundings need: ``deck``, ``surface``.
     motions: Mapping[str, MotionSource] = field(default_factory=dict)
     #: Where the drum stands at the start, in metres of rope hauled in from where it holds the

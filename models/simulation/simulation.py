@@ -250,6 +250,12 @@ def prepare(
 
         scenario = scenario_named(scenario, case)
     case = scenario.case_for(case)
+    knows = holds_brake(controller) or hasattr(controller, "touch_down")
+    if scenario.touch_down is not None and not knows:
+        raise InputError(
+            f"scenario {scenario.name}: {controller.name} has no touch-down phase: wrap it in "
+            "synth.controllers.touching_down, or ask for touchdown none"
+        )
     sample_time = check_range(
         controller.name, "sample_time", controller.sample_time, low=0.0, unit="s", open_low=True
     )

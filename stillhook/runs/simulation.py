@@ -23,7 +23,7 @@ from models.plant import MAX_MASSES, DriveLimits
 from models.run import Event, NamedQuantity, Run
 from models.sensing import Controller, holds_brake
 from models.simulation import Progress, Simulation, SimulationOptions, prepare, run_simulation
-from synth.controllers import operated
+from synth.controllers import operated, touching_down
 from synth.design import Design, Tuning
 
 from ..controllers import controller_of
@@ -50,10 +50,12 @@ class Series:
         """
         if options.duration is not None:
             scenario = replace(scenario, duration=options.duration)
+        own = scenario.case_for(case)
         if scenario.enabled is not None or scenario.resets:
             ramp = {"ramp": scenario.ramp} if scenario.ramp > 0.0 else {}
-            own = scenario.case_for(case)
             controller = operated(controller, own, rate=scenario.rate, **ramp)
+        if scenario.touch_down is not None:
+            controller = touching_down(controller, own, scenario.touch_down)
         simulation = prepare(case, controller, scenario, options)
         if options.lock_limit is None:
             simulation = simulation.with_options(lock_limit=_default_lock_limit(simulation))

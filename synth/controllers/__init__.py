@@ -14,5 +14,6 @@ if TYPE_CHECKING:
     from .feed_forward import VelocityFeedForward
     from .interface import operated
     from .linear_feedback import LinearFeedback
+    from .touch_down import touching_down
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

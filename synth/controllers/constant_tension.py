@@ -134,7 +134,9 @@ class ConstantTension(RecursiveController):
         gain: float | None = None,
         drag: float = 0.0,
     ) -> SampledLoop:
-        """Return the loop without the dead band.
+        """Return the loop without the dead band, about the load at rest.
+
+        The rate at which the drum gives way is the same about any set-point.
 
         Parameters
         ----------
@@ -145,12 +147,15 @@ class ConstantTension(RecursiveController):
         drag
             Linear drag of the payload [N s/m].
         """
+        plant = build_plant(case) if plant is None else plant
+        rest = plant.operating_point().tension
 
         def law(xc: ca.SX, m: Signals) -> tuple[ca.SX, ca.SX]:
-            error = self.set_point - m["rope.tension"]
-            return self._respond(xc, m, error, self.gain if gain is None else gain)
+            # Of a set-point far from it the speed limit would be all that is seen.
+            return self._respond(
+                xc, m, rest - m["rope.tension"], self.gain if gain is None else gain
+            )
 
-        plant = build_plant(case) if plant is None else plant
         recursion = make_recursion(self.loop.initial, law)
         return sampled_loop(case, plant, recursion, self.loop.sample_time, drag=drag)
 

@@ -19,12 +19,13 @@ from models.operation import (
     Scenario,
     Schedule,
     SineMotion,
+    TouchDown,
     scenario_named,
     scenario_names,
     scenario_options,
 )
 from models.operation.profile import Move, Profile
-from models.plant import Deck, Seabed, Surroundings
+from models.plant import Deck, PlantData, Seabed, Surroundings
 from models.sensing.telemetry import during
 
 CASES = ("thesis-1975", "thesis-1975-rope", "subsea-crane", "landing")
@@ -337,7 +338,37 @@ class TestLibrary:
         assert (down.start, down.distance) == (32.0, -2.5)
         assert (touch.start, touch.distance) == (down.end + 30.0, -5.5)
         assert touch.speed < down.speed
-        assert found.disengage_at == touch.end
+        without = scenario_named("landing", crane, touchdown="none")
+        assert without.touch_down is None
+        assert without.disengage_at == without.profile.moves[1].end
+
+    def test_a_touch_down_is_released_kept_taut_or_neither(self, crane):
+        found = scenario_named("landing", crane, slack=0.5, unloaded=0.4, release_speed=0.25)
+        phase = found.touch_down
+        assert (phase.mode, phase.slack, phase.unloaded, phase.speed) == ("release", 0.5, 0.4, 0.25)
+        assert phase.armed_below == -2.5  # where it waits above the seabed
+        # Slack and stretch are paid out when the brake is set.
+        stretch = crane.payload.submerged_weight * PlantData.from_case(crane).chain_compliance
+        touch = found.profile.moves[1]
+        assert found.disengage_at == pytest.approx(touch.end + (0.5 + stretch) / 0.25)
+        taut = scenario_named("set-down", crane, touchdown="tension", kept_tension=0.2)
+        assert (taut.touch_down.mode, taut.touch_down.kept_tension) == ("tension", 0.2)
+        assert taut.disengage_at is None
+        boat, platform = (scenario_named("set-down", crane, deck=d) for d in ("boat", "platform"))
+        assert boat.touch_down.slack == 2.0 * platform.touch_down.slack
+
+    def test_figures_of_a_touch_down_have_ranges(self, crane):
+        with pytest.raises(InputError, match=r"landing: touchdown must be one of release, tension"):
+            scenario_named("landing", crane, touchdown="drop")
+        with pytest.raises(InputError, match=r"landing: unloaded must be .*, got 1.5"):
+            scenario_named("landing", crane, unloaded=1.5)
+        with pytest.raises(InputError, match="touch-down: mode must be one of release, tension"):
+            TouchDown(mode="none")
+        for name in ("unloaded", "kept_tension", "slack", "speed"):
+            with pytest.raises(InputError, match=f"touch-down: {name} must be"):
+                TouchDown(**{name: 0.0})
+        with pytest.raises(InputError, match="touch-down: unloaded_for must be"):
+            TouchDown(unloaded_for=-1.0)
 
     def test_a_deck_can_be_a_boat_a_platform_or_a_motion(self, crane):
         boat = scenario_named("set-down", crane)

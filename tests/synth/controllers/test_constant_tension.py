@@ -155,3 +155,10 @@ def test_numbers_out_of_range_are_told() -> None:
     ):
         with pytest.raises(InputError, match=text):
             ConstantTension(case, **changes)
+
+
+def test_the_gain_is_that_of_the_load_at_rest_whatever_the_set_point() -> None:
+    # Far from its set-point the speed limit was all that the linear loop saw.
+    case = load_case("landing")
+    usual = ConstantTension(case)
+    assert ConstantTension(case, set_point=0.3 * usual.set_point).gain == usual.gain
