@@ -526,8 +526,8 @@ class DriveWindow:
             if self._short < _SHORT or not _LEAST * self._told < given:
                 return True
             # Near its highest speed the drive's own window closes.
-            top = self.limits.top(speed, self._told)
-            below = given < (1.0 - _SEEN) * top and abs(speed) < (1.0 - _CLEAR) * self.limits.speed
+            clear = abs(speed) < (1.0 - _CLEAR) * self.limits.speed
+            below = clear and given < (1.0 - _SEEN) * self.limits.top(speed, self._told)
             if below or given > self.peak:
                 self._take(min(given, self._told))
             return True

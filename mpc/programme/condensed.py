@@ -30,7 +30,7 @@ import numpy as np
 from models.basics import FloatArray, InputError, SolverError, check_range, pick
 
 from .horizon import Horizon, IntArray, Signals
-from .qp import SoftQP
+from .qp import ITERATIONS, SoftQP
 from .regulator import LQRegulator
 
 Question = tuple[FloatArray, FloatArray, FloatArray]
@@ -128,7 +128,7 @@ class Condensed:
         scale: float | None = None,
         traced: str | None = None,
         links: FloatArray | None = None,
-        iterations: int = 400,
+        iterations: int = ITERATIONS,
         time_limit: float = 0.0,
     ) -> None:
         self.horizon, self.signals, self.cost_rows, self.end = horizon, signals, cost, end

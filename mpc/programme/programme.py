@@ -26,7 +26,7 @@ from models.plant import LinearPlant
 
 from .condensed import Condensed, Constraint, Question
 from .horizon import Horizon, Signals, lasting, sampled
-from .qp import QPSolution, kkt_residual
+from .qp import ITERATIONS, QPSolution, kkt_residual
 from .regulator import LQRegulator, lq_regulator, pole_text, steady_inputs, unreached
 
 Known = Mapping[str, float] | Mapping[str, npt.ArrayLike]
@@ -210,7 +210,7 @@ class Programme(Condensed):
         blocking: Sequence[int] | None = None,
         terminal: Mapping[str, float] | None = None,
         sizes: Mapping[str, float] | None = None,
-        iterations: int = 400,
+        iterations: int = ITERATIONS,
         time_limit: float = 0.0,
     ) -> None:
         T = check_range(_OWNER, "period", period, low=0.0, unit="s", open_low=True)

@@ -27,7 +27,7 @@ _SOFT = 8  # DAQP's bit of a soft row
 _INFEASIBLE = -1  # and its exit flag
 # Twice what any of 36 000 random questions took, up to three times as far off as a sea brings, of
 # 32 moves and 87 rows (583) and of 47 and 102 (668).
-_ITERATIONS = 1500
+ITERATIONS = 1500
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class SoftQP:
         quadratic: float | FloatArray,
         linear: float | FloatArray,
         hard: FloatArray | None = None,
-        iterations: int = _ITERATIONS,
+        iterations: int = ITERATIONS,
         time_limit: float = 0.0,
     ) -> None:
         n, m = len(H), len(rows)
