@@ -17,6 +17,7 @@ from .summary import (
     alternatives_table,
     command_text,
     effect,
+    expected_table,
     facts,
     has_loop,
     limit_table,
@@ -55,12 +56,12 @@ def design_report(design: Design, *, bound: bool = True) -> Report:
             ],
         ),
     ]
-    tables = (
+    titled = (
         ("Structures", alternatives_table(design)),
         ("Members", member_table(design)),
         ("", share_table(design)),
     )
-    sections += [ReportSection(title, [table]) for title, table in tables if table is not None]
+    sections += [ReportSection(title, [table]) for title, table in titled if table is not None]
     if has_loop(design):
         law = f"`{command_text(design)}`"
         sections.append(ReportSection("Gains", [law, parameter_table(design)]))
@@ -70,7 +71,9 @@ def design_report(design: Design, *, bound: bool = True) -> Report:
         sections.append(ReportSection("", [Drawing("nyquist", curve, lambda: nyquist(design))]))
     if design.limits:
         drawing = Drawing("limits", "Use of the limits", lambda: limits(design))
-        sections.append(ReportSection("Limits", [limit_table(design), drawing]))
+        tables = (limit_table(design), expected_table(design))
+        shown = [table for table in tables if table is not None]
+        sections.append(ReportSection("Limits", [*shown, drawing]))
     sections.append(ReportSection("What this rests on", [pairs(facts(design, bound=bound))]))
     return Report(
         name=design.case.name,

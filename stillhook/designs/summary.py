@@ -18,6 +18,7 @@ from ..text import (
     Written,
     columns,
     decibels,
+    duration,
     largest_in,
     number,
     percent,
@@ -65,6 +66,7 @@ _INSTRUMENTS: Mapping[str, set[str]] = {
 }
 """Instruments by what their signals' names begin with."""
 _SIGNALS = {"rope.tension": "rope tension at drum", "rope.lower_tension": "rope tension at load"}
+_ROUNDED = 1e-9  # of what a signal reaches: less at rest is nothing
 _PRICED = 1e-5  # a price below this share of the payload's rms is noise of the solver
 
 
@@ -287,6 +289,24 @@ def limit_table(design: Design) -> Table:
         notes.append("reported: the case asks for the figure only (limits.drive: report)")
     heads = columns(f"limit=; value; bound; use; price={'price' if priced else ''}")
     return Table(columns=heads, rows=rows, notes=tuple(notes))
+
+
+def expected_table(design: Design) -> Table | None:
+    """Return what signals most probably reach with losses that switch; None without a loop."""
+    if not has_loop(design) or design.margins is None:
+        return None
+    plant, time = design.question.plant, design.case.limits.exposure_time
+    rows = []
+    for signal in design.shares:
+        unit = "rpm" if signal == "motor.speed" else plant.units[signal]
+        up, down = (design.switched.extreme(signal, time, way) for way in (1, -1))
+        rest = plant.static.get(signal, 0.0)
+        rest = rest if abs(rest) > _ROUNDED * up else 0.0
+        figures = rest, design.switched.deviation(signal), rest + up, rest - down
+        rows.append((_signal(signal), *(Written(x, quantity(x, unit)) for x in figures)))
+    heads = columns(f"signal=expected in {duration(time)}; rest=at rest; rms; largest; least")
+    notes = ("limits hold the losses in full: they are on the safe side",) if any(plant.loss.values()) else ()
+    return Table(columns=heads, rows=rows, notes=notes)
 
 
 def label_of(design: Design, name: str) -> str:

@@ -24,6 +24,7 @@ from stillhook.designs.report import design_report
 from stillhook.designs.summary import (
     command_text,
     effect,
+    expected_table,
     facts,
     limit_table,
     margin_table,
@@ -226,6 +227,24 @@ def test_shares_of_every_signal_are_told_where_more_than_the_sea_shakes_it():
     assert torque[2] == 0.0  # the reference unit is not heard
     assert torque[4] > torque[3]  # the gear's loss, which the sea does not make
     assert 0.0 < payload[4] < 1e-3  # which their noise alone moves
+
+
+def test_what_signals_most_probably_reach_is_told_with_their_value_at_rest():
+    thesis = expected_table(thesis_design())
+    assert not thesis.notes  # no losses that switch: what is expected is what the limits hold
+    rows = {row[0]: [cell.value for cell in row[1:]] for row in thesis.rows}
+    rest, rms, largest, least = rows["motor torque"]
+    assert largest == pytest.approx(thesis_design().limits["motor.torque.peak"].value)
+    assert rms == pytest.approx(thesis_design().assessment.sigma("motor.torque"))
+    assert least == pytest.approx(2.0 * rest - largest)
+    assert rows["payload displacement"][0] == 0.0
+    crane = sh.evaluate_gains(load_case("subsea-crane"), {"a": 16.0, "a1": 44.0, "a2": 6.4})
+    lossy = expected_table(crane)
+    assert lossy.notes == ("limits hold the losses in full: they are on the safe side",)
+    torque = next(row[3].value for row in lossy.rows if row[0] == "motor torque")
+    assert torque < crane.limits["motor.torque.peak"].value
+    assert expected_table(unstable_design()) is None
+    assert expected_table(loopless_design()) is None
 
 
 def test_margins_in_words():
