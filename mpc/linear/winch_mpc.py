@@ -295,7 +295,8 @@ class WinchMPC(ABC):
         self._answered = True  # whether the last step had its command of the programme
 
     def commanded(self, command: float) -> None:
-        """Take note of what went to the drive instead of the last command."""
+        """Take note of what went to the drive, maybe instead of the last command."""
+        self._sent = command
         if self.model.winch.waiting:
             self.estimator.given = command
 
@@ -382,10 +383,9 @@ class WinchMPC(ABC):
         return float(solved.v[0])
 
     def _given(self, command: float) -> float:
-        """Return a command within the voltage, of which the estimator hears where it is late."""
-        self._sent = command = min(max(command, -self.window.voltage), self.window.voltage)
-        if self.model.winch.waiting:
-            self.estimator.given = command
+        """Return a command within the voltage, of which note is taken."""
+        command = min(max(command, -self.window.voltage), self.window.voltage)
+        self.commanded(command)
         return command
 
     def _otherwise(self, chi: FloatArray, reference: FloatArray) -> float:
