@@ -305,7 +305,11 @@ def expected_table(design: Design) -> Table | None:
         figures = rest, design.switched.deviation(signal), rest + up, rest - down
         rows.append((_signal(signal), *(Written(x, quantity(x, unit)) for x in figures)))
     heads = columns(f"signal=expected in {duration(time)}; rest=at rest; rms; largest; least")
-    notes = ("limits hold the losses in full: they are on the safe side",) if any(plant.loss.values()) else ()
+    notes = (
+        ("limits hold the losses in full: they are on the safe side",)
+        if any(plant.loss.values())
+        else ()
+    )
     return Table(columns=heads, rows=rows, notes=notes)
 
 
