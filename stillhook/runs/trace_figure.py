@@ -97,7 +97,8 @@ def traces(run: Run, window: Window | None = None) -> Figure:
     headline(figure, _finding(run), f"{about}: {lasting}")
     handles, labels = grid[0][-1].get_legend_handles_labels()
     if len(labels) > 1:
-        figure.legend(handles, labels, loc="upper right", ncols=3, borderpad=0.1)
+        beside = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}  # the small title
+        grid[0][-1].legend(handles, labels, ncols=3, borderpad=0.1, **beside)
     if told:
         figure.supxlabel(_events_text(run), x=0.012, ha="left", fontsize=9.0)
     return figure
