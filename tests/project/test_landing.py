@@ -187,7 +187,7 @@ def test_what_the_page_says(rows, designs):
     without = landing.values(rows, "mpc, touchdown none", "lifted")
     assert np.median(without) > 0.3
     assert landing.mean(rows, "mpc, touchdown none", "slack_events").mean > 15.0
-    assert landing_page.snaps(rows, "mpc, touchdown none") >= 15
+    assert landing_page.snaps(rows, "mpc, touchdown none") > 10  # of 20
     assert max(landing.values(rows, "mpc, touchdown none", "hardest")) > 1.0
     for name in landing_page.landers(rows):
         assert landing_page.snaps(rows, name) == 0, name
