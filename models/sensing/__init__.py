@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         HEARD,
         STATUSES,
         Controller,
+        ControllerAround,
         Measurement,
         Recursion,
         holds_brake,

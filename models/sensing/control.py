@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import casadi as ca
 import numpy as np
@@ -166,6 +166,32 @@ class Recursion:
                 f"recursion: function must take {wanted[0]} and return {wanted[1]} numbers "
                 f"(state and measurements, state and command), got {got[0]} and {got[1]}"
             )
+
+
+class ControllerAround:
+    """A controller in Python around another; whatever else that has, this has too."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._controller = controller
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # while it is copied or unpickled there is no controller yet
+            raise AttributeError(name)
+        return getattr(self._controller, name)
+
+    @property
+    def name(self) -> str:
+        """What the controller within is called in results."""
+        return self._controller.name
+
+    @property
+    def sample_time(self) -> float:
+        """That of the controller within [s]."""
+        return self._controller.sample_time
+
+    def reset(self) -> None:
+        """Forget every earlier measurement."""
+        self._controller.reset()
 
 
 def recursion_of(controller: Controller) -> Recursion | None:

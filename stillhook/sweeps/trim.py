@@ -9,14 +9,22 @@ it, as deviations from a static state that is shifted to the true one.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from models.case import Case
 from models.plant import MEAN_LOSSES, build_plant
-from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
+from models.sensing import (
+    HEARD,
+    Controller,
+    ControllerAround,
+    Measurement,
+    Recursion,
+    holds_brake,
+    recursion_of,
+)
 from synth.structures import RecursiveController, Signals, make_recursion
 
 _SHIFTED = ("drive.applied", "rope.tension", "motor.torque")
@@ -69,28 +77,13 @@ def _shifted(recursion: Recursion, shift: Shift) -> Recursion:
     return make_recursion(np.concatenate([recursion.initial, shift]), law)
 
 
-class _Trimmed:
+class _Trimmed(ControllerAround):
     """A controller in Python with its static part shifted."""
 
     def __init__(self, controller: Controller, shift: Shift) -> None:
-        self._controller, self._shift = controller, shift
+        super().__init__(controller)
+        self._shift = shift
         self._at = [HEARD.index(name) for name in _SHIFTED]
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # while it is unpickled there is no controller yet
-            raise AttributeError(name)
-        return getattr(self._controller, name)
-
-    @property
-    def name(self) -> str:
-        return self._controller.name
-
-    @property
-    def sample_time(self) -> float:
-        return self._controller.sample_time
-
-    def reset(self) -> None:
-        self._controller.reset()
 
     def step(self, measurement: Measurement, time: float) -> float:
         values = measurement.values.copy()

@@ -30,10 +30,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
+from typing_extensions import override
 
 from models.basics import check_range
 from models.case import Case
@@ -42,6 +42,7 @@ from models.sensing import (
     HEARD,
     STATUSES,
     Controller,
+    ControllerAround,
     Measurement,
     Recursion,
     holds_brake,
@@ -146,29 +147,16 @@ class OperatedLaw(RecursiveController):
     masses: int = 0  #: Masses along the rope on which the law was found to hold.
 
 
-class _Operated:
+class _Operated(ControllerAround):
     """A controller in Python with the interface about it."""
 
     operated = True
 
     def __init__(self, controller: Controller, parts: _Interface) -> None:
-        self._controller = controller
+        super().__init__(controller)
         before, after = parts.functions()
         self._asked = Stepper(before, np.zeros(parts.ASKED))
         self._given = Stepper(after, np.zeros(parts.GIVEN))
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # while it is unpickled there is no controller yet
-            raise AttributeError(name)
-        return getattr(self._controller, name)
-
-    @property
-    def name(self) -> str:
-        return self._controller.name
-
-    @property
-    def sample_time(self) -> float:
-        return self._controller.sample_time
 
     @property
     def status(self) -> str:
@@ -177,8 +165,11 @@ class _Operated:
         own = str(getattr(self._controller, "status", "engaged"))
         return own if name in _USUAL and own not in _USUAL else name
 
+    @override
     def reset(self) -> None:
-        for part in (self._controller, self._asked, self._given):
+        """Forget every earlier measurement."""
+        super().reset()
+        for part in (self._asked, self._given):
             part.reset()
 
     def step(self, measurement: Measurement, time: float) -> float:
@@ -193,7 +184,7 @@ class _Operated:
         wanted = self._controller.step(Measurement(shown), time)
         command = float(self._given.run(np.append(seen, wanted))[0])
         commanded = getattr(self._controller, "commanded", None)
-        if commanded is not None:  # a law whose commands take their time to the drive
+        if commanded is not None:  # a law that compares it with what the drive follows
             commanded(command)
         return command
 

@@ -30,12 +30,21 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from typing_extensions import override
 
 from models.basics import FloatArray
 from models.case import Case
 from models.operation import TouchDown
 from models.plant import build_plant
-from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
+from models.sensing import (
+    HEARD,
+    Controller,
+    ControllerAround,
+    Measurement,
+    Recursion,
+    holds_brake,
+    recursion_of,
+)
 
 from ..structures import RecursiveController, Signals, make_recursion
 from .constant_tension import ConstantTension
@@ -149,26 +158,22 @@ def _around(law: _Law, inner: Recursion) -> Recursion:
     return make_recursion(np.concatenate([inner.initial, law.initial]), both)
 
 
-class _Asked:
-    """A controller in Python with a touch-down phase; whatever else it has, it has still."""
+class _Asked(ControllerAround):
+    """A controller in Python with a touch-down phase."""
 
     def __init__(self, controller: Controller, law: _Law, phase: TouchDown) -> None:
-        self._controller, self._law, self.touch_down = controller, law, phase
-        self.name, self.sample_time = controller.name, controller.sample_time
+        super().__init__(controller)
+        self._law, self.touch_down = law, phase
         self._state, self._landed = law.initial, False
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # a copy that has nothing yet
-            raise AttributeError(name)
-        return getattr(self._controller, name)
 
     @property
     def status(self) -> str:
         return "engaged" if self._landed else getattr(self._controller, "status", "")
 
+    @override
     def reset(self) -> None:
         """Forget every earlier measurement."""
-        self._controller.reset()
+        super().reset()
         self._state, self._landed = self._law.initial, False
 
     def step(self, measurement: Measurement, time: float) -> float:
