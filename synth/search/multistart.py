@@ -31,6 +31,9 @@ _LEAST = 8  # starts that are drawn at least, however many agree before
 _ENOUGH, _MOST = 4, 0.6  # starts, and share of all, that come by one place: no more are needed
 _SCATTER, _MOST_SCATTER = 2, 12  # starts about the best, by parameter, and most
 _HOPS = (1.5, 1.5, 1.5, 2.5)  # how far they begin from it, in decades, as long as that helps
+# A start so far above the best place's log cost after some steps led to no better one in any of the
+# searches that were looked at.
+_HOPELESS = 1.5
 _AS_GOOD = 5e-3  # of the log cost, by which rough answers may differ that are as good
 _AHEAD, _ALIKE = 3e-4, 2e-3  # ... before and behind the end that a rough answer is on the way to
 _NEAR, _BESIDE = 0.05, 0.25  # of log cost and parameters, relative: on the way to one end
@@ -228,13 +231,17 @@ def _come_by(
     begin: FloatArray,
     coefficients: Sequence[Coefficients],
     reference: FloatArray,
+    worth: float = np.inf,
 ) -> _Place:
-    """Return the place where a start leads, with the start added to it."""
+    """Return the place where a start leads, with the start added to it.
+
+    One that costs more than `worth` (its logarithm) after some steps leads nowhere.
+    """
     # By discs and by true margins in turns: each of them finds basins that the other misses.
     exact = sum(len(place.begins) for place in places) % 2 == 1
     best = min((p.coarse.objective for p in places if p.arrived), default=np.inf)
     rough = partial(settle, family, reference=reference, rounds=1)
-    coarse = rough(begin, coefficients, exact=exact)
+    coarse = rough(begin, coefficients, exact=exact, worth=worth)
     for _ in range(_LONGER):
         # Along a flat valley a descent takes long; it is worth its while where it may be the best.
         if coarse.message != UNFINISHED or coarse.objective > best + _BEHIND:
@@ -274,7 +281,8 @@ def _hopped(
         back = 0
         for k, begin in enumerate(begins):
             tell("hops", k, len(begins))
-            end = _come_by(family, places, begin, best.coarse.coefficients, reference).coarse
+            worth = now + _HOPELESS
+            end = _come_by(family, places, begin, best.coarse.coefficients, reference, worth).coarse
             back += end.converged and abs(end.objective - now) < _AS_GOOD
             if back == _ENOUGH:
                 break

@@ -94,6 +94,7 @@ def settle(
     rounds: int = _ROUNDS,
     reach: float | None = None,
     tighten: dict[tuple[int, str], float] | None = None,
+    worth: float = np.inf,
 ) -> Solution:
     """Return the answer that is reached from a point, on nodes that suit the loop there.
 
@@ -106,7 +107,7 @@ def settle(
     rounds
         Most renewals of the nodes; the first of them, far from the answer, holds margins by discs,
         which see a limit before it is broken.  One alone goes only roughly to the end, if not fine.
-    reach, tighten
+    reach, tighten, worth
         See `GainProgramme.solve`.
     """
     last: Solution | None = None
@@ -123,7 +124,7 @@ def settle(
             fine=fine,
             exact=exact or fine or k > 0,
         )
-        found = programme.solve(programme.pack(values, coefficients, extra), reach, tighten)
+        found = programme.solve(programme.pack(values, coefficients, extra), reach, tighten, worth)
         iterations += found.iterations
         found = replace(found, iterations=iterations)
         if not np.isfinite(found.objective):

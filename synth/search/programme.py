@@ -129,6 +129,10 @@ class GainProgramme:
         self._tolerance, self._calm = tolerance, in_a_calm
         many = _MOST_STEPS if count > _MANY else _STEPS
         self._most = many if max_iterations is None else max_iterations
+        # A slack in the rows lets the curve through -1.
+        self._guarded = goal is Goal.COST and all(
+            any(limit.name == "max_sensitivity" for limit in s.problem.limits) for s in scenarios
+        )
         # Where the logarithms of each member's coefficients stand.
         at, self._elements_at = count, []
         for scenario in scenarios:
@@ -217,13 +221,17 @@ class GainProgramme:
         return np.array([cost.item() for cost in costs]), worst
 
     def solve(
-        self, start: FloatArray, reach: float | None = None, tighten: Tighten | None = None
+        self,
+        start: FloatArray,
+        reach: float | None = None,
+        tighten: Tighten | None = None,
+        worth: float = np.inf,
     ) -> Solution:
         """Return the answer that is reached from a start.
 
         The start is the programme's vector, see `pack`.  `reach` is how far, relatively, a
         parameter may move; `tighten` the relative tightening of bounds by member and name of the
-        limit.
+        limit.  What costs more than `worth` (its logarithm) after some steps is given up.
         """
         low, high = self._box(start, reach)
         found = descend(
@@ -238,6 +246,8 @@ class GainProgramme:
             ),
             tolerance=self._tolerance,
             most=self._most,
+            worth=worth,
+            guarded=self._guarded,
         )
         return self._solution(found, tighten)
 

@@ -16,6 +16,7 @@ unstable are never evaluated: a spectral integral is finite there too.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import daqp
 import numpy as np
@@ -39,9 +40,13 @@ _HEAVY = 1e4  # of the penalty: if rows are broken still, nothing near mends the
 _HOPELESS = 0.999  # share of what rows are broken by that is left where nothing near mends them
 INFEASIBLE = "the limits exclude each other"
 UNFINISHED = "maximum of iterations"
+_SOME = 15  # steps after which a descent must be worth going on with
 _CREEPS, _CREPT = 10, 1e-6  # steps that together gain less than this have arrived
 _NOTHING = 1e-7  # of the objective, promised where no step helps: slopes and values round
 _KEPT = 1e-8  # row that counts as kept
+# No pole can pass the axis between two points so near to each other that both keep the rows so far:
+# there |1 + L| would be none.  Where descents were asked, no step of half the size did.
+_SHORT, _NEARLY_KEPT = 0.2, 0.02
 _SKIPPED = 1e-6  # an update along less than this share of a step is left out
 
 
@@ -100,6 +105,9 @@ class Evaluation(Glance):
         )
 
 
+_Seen = TypeVar("_Seen", bound=Glance)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Descent:
     """Where a descent ended: the point, its evaluation, the multipliers, and how."""
@@ -123,6 +131,8 @@ def descend(
     logarithmic: BoolArray,
     tolerance: float = 1e-8,
     most: int = 60,
+    worth: float = np.inf,
+    guarded: bool = False,
 ) -> Descent:
     """Return the point near a start where nothing gets better within the rows.
 
@@ -130,7 +140,9 @@ def descend(
     `stable` says whether it may be evaluated.
     The start and the ends of each variable are (n,); so is `logarithmic`, which of them are
     logarithms, of size one.  A step must promise more than `tolerance` of the objective to be
-    taken; there are at most `most`.
+    taken; there are at most `most`, and no more than some where the objective is above `worth`
+    still.  If the rows keep |1 + L| off zero, it is `guarded`: a short step between points that
+    keep them is taken as stable.
     """
     x = np.clip(start, low, high)
     prices, equation_prices = np.zeros(0), np.zeros(0)
@@ -156,6 +168,8 @@ def descend(
     reached: list[float] = []  # objectives since the rows are kept
     bends = False  # whether the last step was a bent one
     for k in range(most):
+        if k == _SOME and at.objective > worth:
+            break
         size = np.where(logarithmic, 1.0, _sizes(x, at))
         hessian = at.curvature + rest
         reach = room * size
@@ -187,8 +201,10 @@ def descend(
                 return _ended(x, at, prices, INFEASIBLE, k)
         # A step that will be bent need not have slopes where it leads at first.
         look = glance if bends else evaluate
+        short = guarded and bool(np.all(np.abs(step) <= _SHORT * size))
+        near = short and at.broken <= _NEARLY_KEPT
         moved, new, share = _tried(
-            evaluate, look, stable, x, step, weight, promised, at, hessian, box, stiff
+            evaluate, look, stable, x, step, weight, promised, at, hessian, box, stiff, near
         )
         bends = not np.array_equal(moved, x + step)
         length = float(np.max(np.abs(moved - x) / size))
@@ -317,12 +333,20 @@ def _tried(
     hessian: FloatArray,
     box: tuple[FloatArray, FloatArray],
     stiff: float,
+    near: bool,
 ) -> tuple[FloatArray, Evaluation | None, float]:
     """Return where a step leads to, what is there, and the share of what it promised that it kept.
 
-    There is nothing where the loop is unstable.  `look` is `evaluate`, or does without slopes.
+    There is nothing where the loop is unstable; what is `near` is stable if its rows say so.
+    `look` is `evaluate`, or does without slopes.
     """
     merit = at.objective + weight * at.broken
+
+    def found_at(there: FloatArray, how: Callable[[FloatArray], _Seen]) -> _Seen | None:
+        seen = how(there) if near or stable(there) else None
+        if seen is None or not seen.finite:
+            return None
+        return seen if not near or seen.broken <= _NEARLY_KEPT or stable(there) else None
 
     def kept(new: Glance) -> float:
         # A hair of slack: at the answer itself the merit only rounds.
@@ -330,8 +354,8 @@ def _tried(
         return gained / promised
 
     there = x + step
-    new = look(there) if stable(there) else None
-    if new is None or not new.finite:
+    new = found_at(there, look)
+    if new is None:
         return there, None, -np.inf
     share = kept(new)
     if (
@@ -343,10 +367,9 @@ def _tried(
         rows = new.rows - at.jacobian @ step
         equations = new.equations - at.equation_slopes @ step
         again = _quadratic(at, rows, equations, hessian, box, weight, stiff)
-        if again is not None and stable(x + again[0]):
-            bent = evaluate(x + again[0])
-            if bent.finite and kept(bent) > share:
-                return x + again[0], bent, kept(bent)
+        bent = None if again is None else found_at(x + again[0], evaluate)
+        if again is not None and bent is not None and kept(bent) > share:
+            return x + again[0], bent, kept(bent)
     return there, new if isinstance(new, Evaluation) else evaluate(there), share
 
 
