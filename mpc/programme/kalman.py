@@ -10,10 +10,12 @@ from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dpotrf, dtrtri
 
 from models.basics import FloatArray, solve_discrete_riccati
 
 _SETTLED = 1e-5  # of a state's variance, that the steady gain in place of the right one may add
+_CERTAIN = 1e-12  # of the square of a state's size: a variance below which it is as good as known
 _LOOKED = 16  # samples from one look at that to the next
 
 
@@ -90,13 +92,13 @@ class ChangingGains:
         self._Q = Q / np.outer(scale, scale)
         self._back = scale[:, None] / np.sqrt(R)
         self._outer = np.outer(scale, scale)
-        self._R, self._one = R, np.ones(len(R))
+        self._R, self._eye = R, np.eye(len(R))
         self._added, self._steady = {}, {}
         for there, (added, P) in steady.items():
             self._added[there] = added / self._outer
             if P is not None:
                 P = P / self._outer
-                gain = kalman_gain(self._C, self._one, P, np.frombuffer(there, np.bool_))
+                gain = kalman_gain(self._C, np.ones(len(R)), P, np.frombuffer(there, np.bool_))
                 self._steady[there] = P, gain
         self.begin(Q)
 
@@ -105,6 +107,7 @@ class ChangingGains:
         self._P = P / self._outer
         self._there = b""
         self._held: FloatArray | None = None
+        self._seen: FloatArray | None = None
         self._spread: FloatArray | None = None
         self._samples = 0
 
@@ -122,7 +125,8 @@ class ChangingGains:
     def innovations(self) -> FloatArray:
         """Variances of what the outputs of the next sample are off their predictions by, (ny,)."""
         if self._spread is None:
-            self._spread = self._R * (1.0 + np.sum((self._C @ self._P) * self._C, axis=1))
+            seen = self._seen = self._C @ self._P
+            self._spread = self._R * (1.0 + np.einsum("ij,ij->i", seen, self._C))
         return self._spread
 
     def at(self, there: npt.NDArray[np.bool_], C: FloatArray | None = None) -> FloatArray:
@@ -136,22 +140,29 @@ class ChangingGains:
             self._samples = 0
         if self._held is not None:
             return self._held
-        P, self._spread = self._P, None
-        C = self._C if C is None else C * self._unit
-        gain = kalman_gain(C, self._one, P, there)
+        P, seen = self._P, self._seen
+        rows = self._C if C is None else C * self._unit
+        if seen is None or C is not None:
+            seen = rows @ P
+        # What is not there tells nothing: a row of zeros, and so a column of the gain.
+        seen = seen * there[:, None]
+        root = dtrtri(dpotrf(seen @ rows.T * there + self._eye, lower=1)[0], lower=1)[0]
+        told = root @ seen
+        gain = told.T @ root
+        self._seen = self._spread = None
         self._samples += 1
-        if self._samples % _LOOKED == 0 and key in self._steady:
-            steady, held = self._steady[key]
-            off = gain - held
-            seen = off @ C
-            added = np.sum((seen @ P) * seen, axis=1) + np.sum(off * off, axis=1)
-            if np.all(added <= _SETTLED * np.diag(P)):
-                self._P = steady
-                self._held = np.asarray(held * self._back)
-                return self._held
-        P = self._A @ (P - gain @ (C @ P)) @ self._A.T
-        P += self._added.get(key, self._Q)
-        self._P = 0.5 * (P + P.T)
+        if self._samples % _LOOKED == 0:
+            P = 0.5 * (P + P.T)
+            if key in self._steady:
+                steady, held = self._steady[key]
+                off = gain - held
+                added = np.sum((off @ rows @ P) * (off @ rows), axis=1) + np.sum(off * off, axis=1)
+                if np.all(added <= _SETTLED * np.maximum(np.diag(P), _CERTAIN)):
+                    self._P = steady
+                    self._held = np.asarray(held * self._back)
+                    return self._held
+        self._P = self._A @ (P - told.T @ told) @ self._A.T
+        self._P += self._added.get(key, self._Q)
         return np.asarray(gain * self._back)
 
 

@@ -123,6 +123,22 @@ def test_a_set_that_lasts_comes_to_its_steady_gain_and_is_held_there():
     assert np.array_equal(back, gains.steady(every))
 
 
+def test_a_state_that_is_known_for_certain_keeps_no_gain_from_being_held():
+    """What a sum of rounding errors adds to a variance of zero is more than any share of it."""
+    A, C = np.array([[0.9, 0.1], [0.0, 0.5]]), np.array([[1.0, 0.0]])
+    Q, R, all_there = np.diag([0.01, 0.0]), np.ones(1), np.array([True])
+    P = 0.05 * np.diag([1.0, 0.0]) + 1e-20 * np.array([[0.0, 1.0], [1.0, 0.0]])
+    for _ in range(200):
+        gain = kalman_gain(C, R, P)
+        P = A @ corrected(P, C, R, gain) @ A.T + Q
+    P[1] = P[:, 1] = [1e-20, 0.0]
+    gains = ChangingGains(A, C, Q, R, {all_there.tobytes(): (Q, P)}, np.ones(2))
+    gains.begin(np.diag([0.1, 0.0]))
+    for _ in range(400):
+        last = gains.at(all_there)
+    assert np.array_equal(last, gains.steady(all_there))
+
+
 def test_signals_that_nobody_planned_for_have_a_gain_too():
     A, C = np.array([[1.0, 0.1], [0.0, 1.0]]), np.eye(2)
     Q, R = 0.01 * np.eye(2), np.ones(2)
