@@ -205,7 +205,7 @@ class WinchMPC(ABC):
             self.name += "-preview"
         # A path that comes from outside tells where the sea is at its end, if it is known how well
         # the estimator knows it at the start.
-        self._sea_covariance = None if self.predictor is None else self.estimator.sea_covariance
+        self._sea_covariance = None if self.predictor is None else believed.sea_covariance
         self._shows = np.ascontiguousarray(believed.hook[:, believed.sea_at])  # of the sea's state
         unit = case.winch.drive.torque_peak
         self.window = DriveWindow(self.model.winch, limits, len(blocks), unit)

@@ -12,9 +12,16 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .condensed import Condensed, Constraint, Question
     from .controller import PredictiveController
-    from .filter import KalmanFilter
+    from .filter import KalmanFilter, ages, late_row, remember
     from .horizon import Horizon, Signals, default_blocking, free_outputs, sampled
-    from .kalman import ChangingGains, corrected, end_of_record, kalman_gain, prediction_covariance
+    from .kalman import (
+        Mask,
+        SampledFilter,
+        corrected,
+        end_of_record,
+        kalman_gain,
+        prediction_covariance,
+    )
     from .programme import Plan, Programme
     from .qp import QPSolution, SoftQP, kkt_residual
     from .regulator import LQRegulator, lq_regulator

@@ -9,7 +9,7 @@ earlier values that the state remembers; between two samples these are taken as 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -17,11 +17,10 @@ from models.basics import FloatArray, InputError, SolverError, check_range, pick
 from models.plant import LinearPlant
 
 from .horizon import lasting, sampled
-from .kalman import ChangingGains, prediction_covariance
+from .kalman import SampledFilter, prediction_covariance
 from .regulator import pole_text, unreached
 
 _OWNER = "Kalman filter"
-_LOST = 1e12  # times what is usually not known, beyond which it is begun anew
 
 
 class KalmanFilter:
@@ -40,13 +39,6 @@ class KalmanFilter:
     constants
         Inputs and disturbances to which something unknown is added that lasts, by how far it
         wanders in a second.
-
-    Attributes
-    ----------
-    state
-        Estimate of the plant's state, a deviation from rest, (n,).
-    blind
-        For how many samples nothing was heard.
 
     Raises
     ------
@@ -79,33 +71,23 @@ class KalmanFilter:
         held = np.hstack([B, lasting(self._from_path, np.ones(nw))])
         at = [driven.index(name) for name in wander]
         self._names, self._at = tuple(wander), slice(n, n + len(at))
-        ages = [
-            (delay - 0.5 * min(hold, T)) / T
-            for delay, hold in zip(plant.delays, plant.holds, strict=True)
-        ]
-        depth = [math.ceil(age - 1e-6) for age in ages]
-        first = np.cumsum([self._at.stop, *depth])
-        size = int(first[-1])
+        late = ages(plant, T)
+        depth = np.ceil(late - 1e-6).astype(np.int64)
+        first = np.cumsum([self._at.stop, *depth]).tolist()
+        size = first.pop()
         self._direct = np.hstack([plant.D, plant.F])
-        now = np.zeros((len(ages), size))
+        now = np.zeros((len(late), size))
         now[:, :n], now[:, self._at] = plant.C, self._direct[:, at]
-        self._A, self._C = np.zeros((size, size)), np.zeros_like(now)
+        self._A = np.zeros((size, size))
         self._A[:n, :n], self._A[:n, self._at] = A, held[:, at]
         self._A[self._at, self._at] = np.eye(len(at))
-        # A register of each late measurement: what is there now enters, the others move on.
-        self._fresh, self._enters = np.zeros(len(ages)), np.zeros((size, len(ages)))
-        for k, (age, own) in enumerate(zip(ages, depth, strict=True)):
-            here = int(first[k])
-            if own:
-                self._A[here], self._enters[here, k] = now[k], 1.0
-                self._A[here + 1 : here + own, here : here + own - 1] = np.eye(own - 1)
-            whole, share = divmod(max(age, 0.0) + 1e-9, 1.0)
-            for back, weight in ((int(whole), 1.0 - share), (int(whole) + 1, share)):
-                if back == 0:
-                    self._C[k] += weight * now[k]
-                    self._fresh[k] = weight
-                elif back <= own:
-                    self._C[k, here + back - 1] += weight
+        remember(self._A, now, first, depth)
+        rows = [late_row(*one) for one in zip(now, first, depth, late, strict=True)]
+        self._C = C = np.array(rows).reshape(now.shape)
+        # What acts at once is shown at once, and enters the registers of what is late.
+        self._fresh, self._enters = np.clip(1.0 - late, 0.0, 1.0), np.zeros(now.T.shape)
+        waits = np.flatnonzero(depth)
+        self._enters[np.array(first)[waits], waits] = 1.0
         self._B = np.zeros((size, nu))
         self._B[:n] = B
         sizes = np.array([noise.get(name, 0.0) for name in driven])
@@ -117,7 +99,7 @@ class KalmanFilter:
         G[self._at, len(driven) + n :] = np.diag([wander[k] * math.sqrt(T) for k in wander])
         R = np.array([noise[name] for name in plant.measurements]) ** 2
         for what, (matrix, seen) in {
-            f"measurements ({', '.join(plant.measurements)}) must tell of": (self._A.T, self._C.T),
+            f"measurements ({', '.join(plant.measurements)}) must tell of": (self._A.T, C.T),
             "noise must reach": (self._A, G),
         }.items():
             mode = unreached(matrix, seen)
@@ -127,13 +109,10 @@ class KalmanFilter:
                     f"itself; there is one at {pole_text(mode, T)}"
                 )
         try:
-            P = prediction_covariance(self._A, self._C, G, R, np.ones(size))
-            P = prediction_covariance(self._A, self._C, G, R, _sizes(P))
+            P = prediction_covariance(self._A, C, G, R, np.ones(size))
         except SolverError as error:
             raise InputError(f"{_OWNER}: noise and measurements must fit ({error})") from error
-        self._P, everything = P, np.ones(len(R), dtype=np.bool_)
-        steady = {everything.tobytes(): (G @ G.T, P)}
-        self._gains = ChangingGains(self._A, self._C, G @ G.T, R, steady, _sizes(P))
+        self._filter = SampledFilter(self._A, C, G, R, P, {np.ones(len(R), np.bool_).tobytes(): G})
         static = plant.static
         self._rest_y = np.array([static.get(name, 0.0) for name in plant.measurements])
         self._rest_u = np.array([static.get(name, 0.0) for name in plant.inputs])
@@ -142,20 +121,23 @@ class KalmanFilter:
 
     def reset(self) -> None:
         """Forget everything: the plant is at rest."""
-        self._chi = np.zeros(len(self._A))
         self._shown: tuple[FloatArray, FloatArray] | None = None
-        self._gains.begin(self._P)
-        self.blind = 0
+        self._filter.reset()
 
     @property
     def state(self) -> FloatArray:
         """Estimate of the plant's state, a deviation from rest, (n,)."""
-        return self._chi[: self._at.start]
+        return self._filter.state[: self._at.start]
+
+    @property
+    def blind(self) -> int:
+        """For how many samples nothing was heard."""
+        return int(self._filter.unheard.min())
 
     @property
     def constants(self) -> Mapping[str, float]:
         """Estimates of what is added to inputs and disturbances, by name."""
-        return dict(zip(self._names, self._chi[self._at].tolist(), strict=True))
+        return dict(zip(self._names, self._filter.state[self._at].tolist(), strict=True))
 
     def step(
         self,
@@ -183,28 +165,53 @@ class KalmanFilter:
         pick(_OWNER, "measurement", plant.measurements, list(measurements))
         u = _vector("input", plant.inputs, inputs, self._rest_u)
         w = _vector("disturbance", plant.disturbances, disturbances, self._rest_w)
-        ahead, direct = self._chi, self._direct @ np.concatenate([u, w])
+        ahead, direct = self._filter.state, self._direct @ np.concatenate([u, w])
         if self._shown is not None:
             before, path = self._shown
             ahead = self._A @ ahead + self._B @ u + self._enters @ before
             ahead[: self._at.start] += self._from_path @ np.concatenate([path, w])
         self._shown = direct, w
         reading = np.array([measurements.get(name, math.nan) for name in plant.measurements])
-        there = np.isfinite(reading)
         error = reading - self._rest_y - self._C @ ahead - self._fresh * direct
-        gain = self._gains.at(there)
-        self._chi = ahead + gain @ np.where(there, error, 0.0)
-        self.blind = 0 if there.any() else self.blind + 1
-        # What has not been heard of for so long that nothing is known of it is begun anew.
-        if not np.all(np.diag(self._gains.covariance) <= _LOST * _sizes(self._P) ** 2):
-            self._gains.begin(self._P)
+        self._filter.correct(ahead, error, np.isfinite(reading))
         return self.state
 
 
-def _sizes(P: FloatArray) -> FloatArray:
-    """Return the standard deviations of a covariance, one where there is none."""
-    known = np.sqrt(np.diag(P))
-    return np.where(known > 0.0, known, 1.0)
+def ages(plant: LinearPlant, period: float) -> FloatArray:
+    """Return how old measurements usually are, in samples, (ny,); one that is held, in the mean.
+
+    Of a reading that is taken at a sample there is none within that sample: half of it less than
+    the mean age of a hold in continuous time.
+    """
+    return (np.array(plant.delays) - 0.5 * np.minimum(plant.holds, period)) / period
+
+
+def remember(A: FloatArray, now: FloatArray, first: Iterable[int], depth: Iterable[int]) -> None:
+    """Put registers of late signals into A: the present value enters, the others move on.
+
+    Of each signal: the row of the present value, where its register begins and how long it is.
+    """
+    for row, here, own in zip(now, first, depth, strict=True):
+        if own:
+            A[here] = row
+            A[here + 1 : here + own, here : here + own - 1] = np.eye(own - 1)
+
+
+def late_row(now: FloatArray, first: int, depth: int, samples: float) -> FloatArray:
+    """Return the row of a signal that is so many samples late, (n,): linear in between.
+
+    Its present row (n,), where its register begins and how long it is, the oldest that there is.
+    """
+    samples = min(max(samples, 0.0), float(depth))
+    whole = math.floor(samples + 1e-6)
+    share = max(samples - whole, 0.0)
+    row = np.zeros(len(now))
+    for back, weight in ((whole, 1.0 - share), (whole + 1, share)):
+        if weight > 1e-9 and back == 0:
+            row += weight * now
+        elif weight > 1e-9:
+            row[first + back - 1] += weight
+    return row
 
 
 def _vector(

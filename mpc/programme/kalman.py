@@ -6,15 +6,26 @@ Every measurement is taken in units of its own error, since a state of radians, 
 and sensors of any precision would leave nothing of a common scale.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dpotrf, dtrtri
 
-from models.basics import FloatArray, solve_discrete_riccati
+from models.basics import FloatArray, SolverError, solve_discrete_riccati
+
+Mask = npt.NDArray[np.bool_]
 
 _SETTLED = 1e-5  # of a state's variance, that the steady gain in place of the right one may add
+_LOST = 1e12  # times the variance at the start
 _LOOKED = 16  # samples from one look at that to the next
+
+
+def known(P: FloatArray) -> FloatArray:
+    """Return the standard deviations of a covariance, (n,), one where there is none."""
+    sizes = np.sqrt(np.diag(P))
+    return np.where(sizes > 0.0, sizes, 1.0)
 
 
 def prediction_covariance(
@@ -27,17 +38,21 @@ def prediction_covariance(
 
     Raises SolverError if there is none.
     """
-    # Each state in its own size, each measurement in units of its own error.
-    P = solve_discrete_riccati(
-        A / scale[:, None] * scale,
-        C * scale / np.sqrt(R)[:, None],
-        (G / scale[:, None]) @ (G / scale[:, None]).T,
-    )
-    return np.asarray(P * np.outer(scale, scale))
+    # Some states are known to a fiftieth of their size and less: in units of what they are known
+    # to, the equation is solved an order of magnitude closer, and what no noise reaches is certain.
+    for _ in range(2):
+        # Each state in its own size, each measurement in units of its own error.
+        P = solve_discrete_riccati(
+            A / scale[:, None] * scale,
+            C * scale / np.sqrt(R)[:, None],
+            (G / scale[:, None]) @ (G / scale[:, None]).T,
+        ) * np.outer(scale, scale)
+        scale = known(P)
+    return np.asarray(P)
 
 
 def kalman_gain(
-    C: FloatArray, R: FloatArray, P: FloatArray, there: npt.NDArray[np.bool_] | None = None
+    C: FloatArray, R: FloatArray, P: FloatArray, there: Mask | None = None
 ) -> FloatArray:
     """Return the gain of the measurements that are there, (n, ny); zero columns of the others.
 
@@ -54,8 +69,10 @@ def kalman_gain(
     return gain
 
 
-class ChangingGains:
-    """Gains of a Kalman filter whose signals come and go.
+class SampledFilter:
+    r"""The filter of a sampled model, in matrices, whose signals come and go.
+
+        x+ = A x + what is known + G n,    y = C x + v,    n: white, covariance one
 
     The gain that is right for all signals together may let a filter run away that hears some of
     them only.  Each set of signals has a steady gain; where the set changes, the covariance is
@@ -63,69 +80,104 @@ class ChangingGains:
 
     Parameters
     ----------
-    A, C, Q, R
-        The process and its outputs: (n, n), (ny, n), the covariance (n, n) of what a sample adds,
-        and the variances (ny,) of the outputs' errors.
-    steady
-        Of each set of signals that has one, by the signals that are there as bytes of (ny,)
-        booleans: what a sample adds with them, (n, n), and the covariance of the steady one-step
-        prediction, (n, n), None if it has none.
-    scale
-        Size of each state, (n,), for the numerics.
+    A, C, G, R
+        The model as the gains reckon with it: (n, n), (ny, n), (n, ng), and the variances of v,
+        (ny,).
+    P
+        Covariance of the prediction that it begins with, (n, n).
+    sets
+        Noise as G, of each set of signals that is to be held at its steady gain, if it has one, by
+        the signals that are there as bytes of (ny,) booleans.
+
+    Attributes
+    ----------
+    state
+        The estimate, (n,).
+    unheard
+        For how many samples each signal was not believed, (ny,).
     """
+
+    #: Gains of the first samples at which all signals are there, (n, ny) each.
+    first: Sequence[FloatArray] = ()
 
     def __init__(
         self,
         A: FloatArray,
         C: FloatArray,
-        Q: FloatArray,
+        G: FloatArray,
         R: FloatArray,
-        steady: Mapping[bytes, tuple[FloatArray, FloatArray | None]],
-        scale: FloatArray,
+        P: FloatArray,
+        sets: Mapping[bytes, FloatArray],
     ) -> None:
-        # Each state in its own size, each output in units of its own error.
+        # Each state in units of what it is known to, each output in units of its own error.
+        scale = known(P)
         self._A = np.ascontiguousarray(A / scale[:, None] * scale)
+        self._half = 0.5 * self._A
         self._unit = scale / np.sqrt(R)[:, None]
         self._C = np.ascontiguousarray(C * self._unit)
-        self._Q = Q / np.outer(scale, scale)
         self._back = scale[:, None] / np.sqrt(R)
         self._outer = np.outer(scale, scale)
-        self._R, self._one = R, np.ones(len(R))
-        self._added, self._steady = {}, {}
-        for there, (added, P) in steady.items():
-            self._added[there] = added / self._outer
-            if P is not None:
-                P = P / self._outer
-                gain = kalman_gain(self._C, self._one, P, np.frombuffer(there, np.bool_))
-                self._steady[there] = P, gain
-        self.begin(Q)
+        self._Q, self._P0 = G @ G.T / self._outer, P / self._outer
+        self._R, self._eye = R, np.eye(len(R))
+        self._added: dict[bytes, FloatArray] = {}
+        self._steady: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+        for key, own in sets.items():
+            there = np.frombuffer(key, np.bool_)
+            self._added[key] = own @ own.T / self._outer
+            with suppress(SolverError):
+                P = prediction_covariance(A, C[there], own, R[there], scale) / self._outer
+                self._steady[key] = P, kalman_gain(self._C, np.ones(len(R)), P, there)
+        self.reset()
 
-    def begin(self, P: FloatArray) -> None:
-        """Begin with the covariance of a prediction, (n, n)."""
-        self._P = P / self._outer
+    def reset(self) -> None:
+        """Forget everything: all is at rest."""
+        self.state = np.zeros(len(self._P0))
+        self.unheard = np.zeros(len(self._C), dtype=np.int64)
+        self._heard = 0  # samples with all signals, as far as they have gains of their own
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin with the covariance anew."""
+        self._P = self._P0
         self._there = b""
         self._held: FloatArray | None = None
+        self._seen: FloatArray | None = None
         self._spread: FloatArray | None = None
         self._samples = 0
 
-    def steady(self, there: npt.NDArray[np.bool_]) -> FloatArray | None:
+    def correct(
+        self, ahead: FloatArray, error: FloatArray, there: Mask, C: FloatArray | None = None
+    ) -> FloatArray:
+        """Return the estimate of a sample, (n,), from its prediction, (n,).
+
+        What is shown less what was expected, and which signals are to be believed, (ny,).  Where
+        they tell of something else than usual, C (ny, n) says of what.
+        """
+        self.unheard = np.where(there, 0, self.unheard + 1)
+        if self._heard < len(self.first) and there.all():
+            gain = self.first[self._heard]
+            self._heard += 1
+        else:
+            gain = self.at(there, C)
+        self.state = ahead + gain @ np.where(there, error, 0.0)
+        if not np.isfinite(self.state).all():
+            self.reset()
+        return self.state
+
+    def steady(self, there: Mask) -> FloatArray | None:
         """Return the steady gain of a set of signals, (n, ny); None if it has none."""
         found = self._steady.get(there.tobytes())
         return None if found is None else np.asarray(found[1] * self._back)
 
     @property
-    def covariance(self) -> FloatArray:
-        """The covariance of the prediction for the next sample, (n, n)."""
-        return np.asarray(self._P * self._outer)
-
-    @property
     def innovations(self) -> FloatArray:
         """Variances of what the outputs of the next sample are off their predictions by, (ny,)."""
         if self._spread is None:
-            self._spread = self._R * (1.0 + np.sum((self._C @ self._P) * self._C, axis=1))
+            seen = self._seen = self._C @ self._P
+            self._spread = self._R * (1.0 + np.einsum("ij,ij->i", seen, self._C))
         return self._spread
 
-    def at(self, there: npt.NDArray[np.bool_], C: FloatArray | None = None) -> FloatArray:
+    def at(self, there: Mask, C: FloatArray | None = None) -> FloatArray:
         """Return the gain of a sample at which some signals are there, (n, ny), and go on.
 
         Where they tell of something else than usual, C (ny, n) says of what.
@@ -136,22 +188,31 @@ class ChangingGains:
             self._samples = 0
         if self._held is not None:
             return self._held
-        P, self._spread = self._P, None
-        C = self._C if C is None else C * self._unit
-        gain = kalman_gain(C, self._one, P, there)
+        P, seen = self._P, self._seen
+        rows = self._C if C is None else C * self._unit
+        if seen is None or C is not None:
+            seen = rows @ P
+        # What is not there tells nothing: a row of zeros, and so a column of the gain.
+        seen = seen * there[:, None]
+        root = dtrtri(dpotrf(seen @ rows.T * there + self._eye, lower=1)[0], lower=1)[0]
+        told = root @ seen
+        gain = told.T @ root
+        self._seen = self._spread = None
         self._samples += 1
         if self._samples % _LOOKED == 0 and key in self._steady:
             steady, held = self._steady[key]
             off = gain - held
-            seen = off @ C
-            added = np.sum((seen @ P) * seen, axis=1) + np.sum(off * off, axis=1)
+            added = np.sum((off @ rows @ P) * (off @ rows), axis=1) + np.sum(off * off, axis=1)
             if np.all(added <= _SETTLED * np.diag(P)):
                 self._P = steady
                 self._held = np.asarray(held * self._back)
                 return self._held
-        P = self._A @ (P - gain @ (C @ P)) @ self._A.T
-        P += self._added.get(key, self._Q)
-        self._P = 0.5 * (P + P.T)
+        half = self._half @ (P - told.T @ told) @ self._A.T
+        self._P = half + half.T  # what is not symmetric an unstable plant would blow up
+        self._P += self._added.get(key, self._Q)
+        # What has not been heard of for so long that nothing is known of it is begun anew.
+        if not self._P.diagonal().max() <= _LOST:
+            self._begin()
         return np.asarray(gain * self._back)
 
 

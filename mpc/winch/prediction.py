@@ -49,6 +49,7 @@ from models.hook import HookMotion
 from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter, noisy_hold, root_of
 from models.sensing import MEASURED, MruModel, SensorModel, low_pass_noise
 
+from ..programme import ages, kalman_gain, late_row, prediction_covariance, remember
 from .sampled import SampledWinch
 
 _OWNER = "prediction model"
@@ -149,18 +150,24 @@ class PredictionModel(ReadOnlyArrays):
         """Size of each state, for the numerics: its standard deviation in the model, or one."""
         return read_only(_scales(self))
 
-    def late_row(self, name: str, delay: float) -> FloatArray:
-        """Return the row of a late signal for another delay [s] than that of the case.
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the filter's steady one-step prediction from all signals, (n, n).
 
-        Linear between samples, as the telemetry itself is; a delay that is longer than what is
-        remembered is cut to that.
+        Raises SolverError if there is none.
         """
-        return _late_row(
-            self.now[LATE.index(name)],
-            self.first[name],
-            self.depth[name],
-            delay / self.winch.sample_time,
-        )
+        return read_only(prediction_covariance(self.A, self.C, self.G, self.R, self.scale))
+
+    @cached_property
+    def gain(self) -> FloatArray:
+        """The filter's steady gain for all signals, (n, ny)."""
+        return read_only(kalman_gain(self.C, self.R, self.covariance))
+
+    @property
+    def sea_covariance(self) -> FloatArray:
+        """Covariance of the sea's state once the sample is known, (nh, nh)."""
+        kept = (self.covariance - self.gain @ self.C @ self.covariance)[self.sea_at, self.sea_at]
+        return np.array(0.5 * (kept + kept.T))
 
 
 def prediction_model(winch: SampledWinch) -> PredictionModel:
@@ -174,8 +181,9 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     sea_A, sea_Q = noisy_hold(sea.A, sea.B, T)
     error_A, error_root, error_C = _unit_error(case, hook, T, (sea_A, sea_Q, sea))
     errors = error_C.shape[1]
-    delays = ages(winch)
-    depth = _depths(case, T, delays)
+    late = ages(winch.plant, T)[: len(LATE)]
+    later = np.repeat([case.sensors.telemetry.jitter / T + _SPARE, 0.0], [len(MEASUREMENTS), 2])
+    depth = dict(zip(LATE, np.ceil(late + later - 1e-6).astype(int).tolist(), strict=True))
     sea_at = slice(n, n + sea.order)
     error_at = slice(sea_at.stop, sea_at.stop + errors)
     constants_at = slice(error_at.stop, error_at.stop + len(CONSTANTS))
@@ -197,18 +205,11 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     A[error_at, error_at] = error_A
     A[:n, constants_at.start : constants_at.start + 2] = winch.from_constants
     A[constants_at, constants_at] = np.eye(len(CONSTANTS))
-    # A shift register for each late signal: the present value enters, the others move on.
-    for k, name in enumerate(LATE):
-        if depth[name]:
-            A[first[name]] = now[k]
-            later = np.arange(first[name] + 1, first[name] + depth[name])
-            A[later, later - 1] = 1.0
+    remember(A, now, first.values(), depth.values())
 
     hook_rows = np.zeros((2, end))
     hook_rows[:, sea_at] = shown
-    late = [
-        _late_row(now[k], first[name], depth[name], delays[name] / T) for k, name in enumerate(LATE)
-    ]
+    rows = [late_row(now[k], first[n], depth[n], late[k]) for k, n in enumerate(LATE)]
     other = np.zeros((len(MEASURED) - len(LATE), end))
     other[:, : n - winch.waiting] = winch.plant.C[len(LATE) :]
     other[:, sea_at] = winch.plant.F[len(LATE) :, :2] @ shown
@@ -233,7 +234,7 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
         now=now,
         first=first,
         depth=depth,
-        C=np.vstack([*late, other]),
+        C=np.vstack([*rows, other]),
         R=np.ones(len(MEASURED)),
         hook=hook_rows,
     )
@@ -373,27 +374,6 @@ def _slow_error(hook: HookMotion, T: float) -> tuple[FloatArray, FloatArray]:
     return low_pass_noise(_SLOW * float(hook.velocity.rms / hook.displacement.rms), T)
 
 
-def ages(winch: SampledWinch) -> dict[str, float]:
-    """Return how old each measurement usually is [s]; one that is held, in the mean.
-
-    Of a reading that is taken at a sample there is none within that sample: half of it less than
-    the mean age of a hold in continuous time.
-    """
-    plant, T = winch.plant, winch.sample_time
-    return {
-        name: delay - 0.5 * min(hold, T)
-        for name, delay, hold in zip(MEASURED, plant.delays, plant.holds, strict=True)
-    }
-
-
-def _depths(case: Case, T: float, delays: Mapping[str, float]) -> dict[str, int]:
-    """Return how many earlier values are remembered of each late signal."""
-    jitter = case.sensors.telemetry.jitter
-    found = {name: math.ceil(delays[name] / T - 1e-6) for name in LATE}
-    more = {name: math.ceil((delays[name] + jitter) / T - 1e-6) + _SPARE for name in MEASUREMENTS}
-    return found | more
-
-
 def _present(
     winch: SampledWinch, shown: FloatArray, sea_at: slice, constants_at: slice, size: int
 ) -> FloatArray:
@@ -405,19 +385,6 @@ def _present(
     rows[: len(MEASUREMENTS), constants_at.start] = winch.force_felt
     rows[0, constants_at.start + 2] = 1.0
     return rows
-
-
-def _late_row(now: FloatArray, first: int, depth: int, samples: float) -> FloatArray:
-    samples = min(max(samples, 0.0), float(depth))
-    whole = math.floor(samples + 1e-6)
-    share = max(samples - whole, 0.0)
-    row = np.zeros(len(now))
-    for back, weight in ((whole, 1.0 - share), (whole + 1, share)):
-        if weight > 1e-9 and back == 0:
-            row += weight * now
-        elif weight > 1e-9:
-            row[first + back - 1] += weight
-    return row
 
 
 def _scales(model: PredictionModel) -> FloatArray:

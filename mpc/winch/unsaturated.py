@@ -16,10 +16,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import ComplexArray, FloatArray, read_only, solve_discrete_lyapunov
+from models.basics import ComplexArray, FloatArray, solve_discrete_lyapunov
 
-from ..programme import LQRegulator, kalman_gain
-from .estimator import kalman_covariance
+from ..programme import LQRegulator
 from .prediction import PredictionModel
 from .regulation import feedback_row
 
@@ -35,16 +34,6 @@ class Unsaturated:
     regulator: LQRegulator
 
     @cached_property
-    def covariance(self) -> FloatArray:
-        """Covariance of the filter's one-step prediction, (n, n)."""
-        return kalman_covariance(self.model)
-
-    @cached_property
-    def gain(self) -> FloatArray:
-        """The filter's gain, (n, ny)."""
-        return read_only(kalman_gain(self.model.C, self.model.R, self.covariance))
-
-    @cached_property
     def _feedback(self) -> FloatArray:
         """Row F of d = -F chi, (n,)."""
         return feedback_row(self.regulator, self.model)
@@ -52,7 +41,7 @@ class Unsaturated:
     @cached_property
     def _kept(self) -> FloatArray:
         """I - L C: what of the prediction is left in the estimate, (n, n)."""
-        return np.asarray(np.eye(self.model.size) - self.gain @ self.model.C)
+        return np.asarray(np.eye(self.model.size) - self.model.gain @ self.model.C)
 
     @cached_property
     def controller(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -66,7 +55,8 @@ class Unsaturated:
         ahead = model.A - model.B @ row[None, :]
         command = -row / winch.gain
         command[: winch.size] += winch.back * winch.reckoned
-        return ahead @ kept, ahead @ self.gain, (command @ kept)[None, :], command[None] @ self.gain
+        gain = model.gain
+        return ahead @ kept, ahead @ gain, (command @ kept)[None, :], command[None] @ gain
 
     def poles(self, plant: PredictionModel | None = None, *, share: float = 1.0) -> ComplexArray:
         """Return the poles of the closed loop on a plant, by default that of the model.
@@ -98,7 +88,7 @@ class Unsaturated:
         A, B, C = true.A[np.ix_(kept, kept)], true.B[kept], true.C[:, kept]
         Ac, Bc, _, _ = self.controller
         row = -self._feedback
-        Cc, Dc = (row @ self._kept)[None, :], (row @ self.gain)[None, :]
+        Cc, Dc = (row @ self._kept)[None, :], (row @ self.model.gain)[None, :]
         through = C @ np.linalg.solve(_pencil(A, z), np.broadcast_to(B, (z.size, *B.shape)))
         back = Cc @ np.linalg.solve(_pencil(Ac, z), np.broadcast_to(Bc, (z.size, *Bc.shape))) + Dc
         return np.asarray(1.0 / (1.0 - (back @ through)[:, 0, 0]))
@@ -114,7 +104,7 @@ class Unsaturated:
     def forecast_error(self, ahead: float) -> float:
         """Return the standard deviation of the hook's forecast, `ahead` [s] from now [m]."""
         model, at = self.model, self.model.sea_at
-        P = (self.covariance - self.gain @ model.C @ self.covariance)[at, at]
+        P = model.sea_covariance
         over, added = model.A[at, at], (model.G @ model.G.T)[at, at]
         for _ in range(round(ahead / model.winch.sample_time)):
             P = over @ P @ over.T + added

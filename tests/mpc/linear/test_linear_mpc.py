@@ -231,7 +231,7 @@ def test_the_path_tells_the_state_of_the_sea_at_its_end():
     over = model.A[model.sea_at, model.sea_at]
     added = (model.G @ model.G.T)[model.sea_at, model.sea_at]
     root = np.linalg.cholesky(added + 1e-15 * np.eye(len(added)))
-    known = controller.estimator.sea_covariance
+    known = controller.estimator.model.sea_covariance
     doubt = np.linalg.cholesky(known + 1e-12 * np.eye(len(known)))
     shown = model.hook[:, model.sea_at]
     from_path, from_sea = sea_at_end(model, 120, known)
@@ -403,8 +403,8 @@ def test_estimate_is_as_good_as_the_filter_says():
     hook = chi @ model.hook[0]
     payload = chi[:, :n] @ model.winch.payload
     later = slice(1200, None)
-    P, C = controller.estimator.covariance, model.C
-    P = P - controller.estimator.gain @ C @ P
+    believed = controller.estimator.model
+    P = believed.covariance - believed.gain @ believed.C @ believed.covariance
     # The filter doubts more than is true here: it is better than it says, but not by much.
     said = math.sqrt(float(model.hook[0] @ P @ model.hook[0]))
     assert 0.1 * said < np.std((hook - run["hook.heave"])[later]) < 1.1 * said

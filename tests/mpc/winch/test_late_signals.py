@@ -16,6 +16,7 @@ from models.sensing import HEARD, MEASURED, Measurement, SensorModel
 from models.simulation import SimulationOptions, prepare, run_simulation
 from mpc.linear import LinearMPC
 from mpc.nonlinear import NonlinearMPC
+from mpc.programme import ages
 from mpc.winch import (
     ProcessNoise,
     WinchEstimator,
@@ -24,7 +25,6 @@ from mpc.winch import (
     sampled_winch,
     with_noise,
 )
-from mpc.winch.prediction import ages
 from mpc.winch.regulation import feedback_row
 from mpc.winch.unsaturated import Unsaturated
 
@@ -94,7 +94,7 @@ def test_the_unsaturated_controller_is_the_regulator_of_late_commands(
     believed = with_noise(prediction_model(sampled_winch(late_case(name, delay))), weights.noise)
     loop = Unsaturated(model=believed, regulator=regulator(believed, weights.torque))
     row = feedback_row(loop.regulator, believed)
-    filtered = believed.A @ (np.eye(believed.size) - loop.gain @ believed.C)
+    filtered = believed.A @ (np.eye(believed.size) - believed.gain @ believed.C)
     regulated = believed.A - believed.B @ row[None, :]
     radius = max(np.abs(np.linalg.eigvals(part)).max() for part in (filtered, regulated))
     assert loop.growth() <= radius + 1e-9
@@ -180,7 +180,7 @@ def test_a_held_reading_is_as_old_as_it_is_in_the_mean() -> None:
     )
     winch = sampled_winch(case, sample_time=T)
     # Telemetry takes 30 ms; a hold of 200 ms is shown at 0, 50, 100 and 150 ms, one of 20 ms once.
-    found = ages(winch)
+    found = dict(zip(MEASURED, T * ages(winch.plant, T), strict=True))
     assert found["payload.velocity"] == pytest.approx(0.03 + 0.1 + 0.075)
     assert found["payload.acceleration"] == pytest.approx(0.03)
     # A late command is on its way in the state, and delays no sensor.

@@ -82,8 +82,8 @@ def sensitivity_on(loop: Unsaturated, plant: PredictionModel, omega: np.ndarray)
     A, B, C = plant.A[np.ix_(kept, kept)], plant.B[kept], plant.C[:, kept]
     Ac, Bc, _, _ = loop.controller
     row = -feedback_row(loop.regulator, believed)
-    held = np.eye(believed.size) - loop.gain @ believed.C
-    Cc, Dc = (row @ held)[None, :], (row @ loop.gain)[None, :]
+    held = np.eye(believed.size) - believed.gain @ believed.C
+    Cc, Dc = (row @ held)[None, :], (row @ believed.gain)[None, :]
     found = []
     for each in z:
         through = C @ np.linalg.solve(each * np.eye(len(A)) - A, B)
@@ -133,7 +133,7 @@ def sea_found(doubt: float) -> float:
     driven = np.concatenate([B @ Dc @ error, Bc @ error])
     x = np.linalg.solve(np.exp(1j * omega * T) * np.eye(len(closed)) - closed, driven)
     y, ahead = C @ x[: len(A)] + error, x[len(A) :]
-    state = ahead + loop.gain @ (y - loop.model.C @ ahead)
+    state = ahead + loop.model.gain @ (y - loop.model.C @ ahead)
     return float(np.linalg.norm(state[loop.model.sea_at]))
 
 

@@ -14,9 +14,8 @@ from models import SolverError
 from models.hook import HookMotion
 from models.plant import build_plant, hermite_hold, noisy_hold, root_of
 from models.sensing import MEASURED
-from mpc.programme import kalman_gain
+from mpc.programme import kalman_gain, late_row
 from mpc.winch import plan_model, prediction_model, regulator, tune_weights, with_noise
-from mpc.winch.estimator import kalman_covariance
 from mpc.winch.prediction import CONSTANTS
 from mpc.winch.regulation import feedback_row
 from mpc.winch.sampled import sampled_winch
@@ -137,14 +136,15 @@ def test_late_signals_are_linear_between_what_is_on_its_way():
     for _ in range(3):
         chi.append(model.A @ chi[-1])
     now = [model.now @ state for state in chi]
+    own = model.now[1], model.first["payload.velocity"], model.depth["payload.velocity"]
     for delay, weights in ((0.0, (1.0, 0.0)), (0.03, (0.4, 0.6)), (T, (0.0, 1.0))):
-        row = model.late_row("payload.velocity", delay)
+        row = late_row(*own, delay / T)
         wanted = weights[0] * now[3][1] + weights[1] * now[2][1]
         assert row @ chi[3] == pytest.approx(wanted)
     usual = model.C[MEASURED.index("payload.velocity")]
-    assert usual == pytest.approx(model.late_row("payload.velocity", 0.03))
+    assert usual == pytest.approx(late_row(*own, 0.03 / T))
     # longer than what is remembered
-    assert model.late_row("payload.velocity", 9.0).any()
+    assert late_row(*own, 9.0 / T).any()
 
 
 def test_a_force_on_the_payload_is_felt_by_its_accelerometer():
@@ -158,7 +158,7 @@ def test_a_force_on_the_payload_is_felt_by_its_accelerometer():
 @pytest.mark.parametrize("name", NAMES)
 def test_filter_covariance_solves_its_equation_and_missing_signals_make_it_worse(name):
     model = with_noise(prediction_model(sampled_winch(case_of(name))), WEIGHTS[name].noise)
-    P = kalman_covariance(model)
+    P = model.covariance
     everything = np.ones(len(model.R), dtype=bool)
     gain = kalman_gain(model.C, model.R, P, everything)
     left = np.eye(model.size) - gain @ model.C
@@ -219,8 +219,8 @@ def test_sensitivity_agrees_with_python_control():
     plant = control.ss(model.A[np.ix_(kept, kept)], model.B[kept], C, np.zeros((len(C), 1)), T)
     # From the measurements to the torque: the controller's own command less what the speed takes.
     Ac, Bc, _, _ = loop.controller
-    row, left = -feedback_row(loop.regulator, model), np.eye(model.size) - loop.gain @ model.C
-    law = control.ss(Ac, Bc, row @ left, row @ loop.gain, T)
+    row, left = -feedback_row(loop.regulator, model), np.eye(model.size) - model.gain @ model.C
+    law = control.ss(Ac, Bc, row @ left, row @ model.gain, T)
     through = plant(np.exp(1j * omega * T))
     back = law(np.exp(1j * omega * T))
     product = np.einsum("ik,ik->k", back[0], through[:, 0])
@@ -242,7 +242,7 @@ def test_payload_in_the_modelled_sea_agrees_with_a_long_simulation_of_the_model(
     G[truth.constants_at] = 0.0
     for _ in range(60_000):
         y = truth.C @ chi + roots * rng.normal(size=len(roots))
-        estimate = ahead + loop.gain @ (y - truth.C @ ahead)
+        estimate = ahead + model.gain @ (y - truth.C @ ahead)
         d = -float(row @ estimate)
         # the true input follows from the command, which the estimated speed went into
         command = truth.winch.command(d, float(truth.winch.speed @ estimate[: truth.winch.size]))
@@ -279,7 +279,7 @@ def test_states_are_measured_by_what_they_are_known_to_be_at_most():
     # A reference unit as its maker states it has errors to which a sample adds next to nothing.
     for case in (models.load_case("subsea-crane"), *map(case_of, NAMES)):
         model = prediction_model(sampled_winch(case, sample_time=0.05))
-        assert np.all(np.sqrt(np.diag(kalman_covariance(model))) < 3.0 * model.scale)
+        assert np.all(np.sqrt(np.diag(model.covariance)) < 3.0 * model.scale)
 
 
 def test_the_bundled_crane_of_today_can_be_tuned():
