@@ -20,6 +20,7 @@ DOCS = ROOT / "docs"
 #: The script that makes each file of `docs/data`.
 SCRIPTS: Mapping[str, str] = {
     "comparison.csv": "docs/make/comparison.py",
+    "faults.csv": "docs/make/faults.py",
     "headline.csv": "docs/make/headline.py",
     "holds.csv": "docs/make/holds.py",
     "landing.csv": "docs/make/landing.py",
@@ -27,6 +28,8 @@ SCRIPTS: Mapping[str, str] = {
     "mpc_solvers.csv": "benchmarks/mpc_speed.py",
     "mpc_steps.csv": "benchmarks/mpc_speed.py",
     "other_seas.csv": "docs/make/other_seas.py",
+    "outages.csv": "docs/make/outages.py",
+    "outages_designs.csv": "docs/make/outages.py",
     "pareto.csv": "docs/make/robust.py",
     "random_starts.csv": "docs/make/random_starts.py",
     "robust.csv": "docs/make/robust.py",
@@ -95,6 +98,14 @@ def write_rows(
         writer.writeheader()
         writer.writerows(rows)
     scratch.replace(path)
+
+
+def put_between(page: Path, name: str, text: str) -> None:
+    """Write a text into a page between the marks `<!-- name: begin -->` and `... end -->`."""
+    begin, end = (f"<!-- {name}: {which} -->" for which in ("begin", "end"))
+    head, rest = page.read_text(encoding="utf-8").split(begin)
+    _, tail = rest.split(end)
+    page.write_text(f"{head}{begin}\n\n{text}\n\n{end}{tail}", encoding="utf-8")
 
 
 def older_than_their_code(folder: Path = DOCS / "data") -> list[str]:

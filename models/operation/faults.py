@@ -53,6 +53,12 @@ FAULTS: Mapping[str, FaultField] = MappingProxyType(
         "mru_outage": FaultField(
             "time", 0.0, _LONG, text="how long the motion reference unit gives no numbers"
         ),
+        "encoder_outage": FaultField(
+            "time", 0.0, _LONG, text="how long the drum's encoder gives no numbers"
+        ),
+        "load_cell_outage": FaultField(
+            "time", 0.0, _LONG, text="how long the load cell gives no numbers"
+        ),
         "brake_trip": FaultField("time", 0.0, _LONG, text="how long the brake is on"),
         "delay_step": FaultField("time", 0.0, 60.0, text="by how much the messages are later"),
         "mru_heave_bias": FaultField(
@@ -83,6 +89,8 @@ _PERIODS = {
     "sensor_outage": "sensor_failures",
     "stuck_readings": "stuck_readings",
     "mru_outage": "mru_outages",
+    "encoder_outage": "encoder_outages",
+    "load_cell_outage": "load_cell_outages",
     "brake_trip": "brake_trips",
 }
 

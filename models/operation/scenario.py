@@ -58,6 +58,10 @@ class Scenario:
     #: Periods in which the payload's sensors show the same for ever, as if it were true [s].
     stuck_readings: tuple[Interval, ...] = ()
     mru_outages: tuple[Interval, ...] = ()  #: Periods without the motion reference unit [s].
+    #: Periods without the drum's encoder [s], after which the brake is on: the controller must have
+    #: the operator's interface (`synth.controllers.operated`).
+    encoder_outages: tuple[Interval, ...] = ()
+    load_cell_outages: tuple[Interval, ...] = ()  #: Periods without the load cell [s]; likewise.
     #: (start, end, extra) [s]: messages sent in the period are late by so much more.
     telemetry_delays: tuple[Late, ...] = ()
     #: (start, end, heave, rate) [s], [m], [m/s]: what the reference unit shows too much.
@@ -93,10 +97,16 @@ class Scenario:
             "sensor_failures",
             "stuck_readings",
             "mru_outages",
+            "encoder_outages",
+            "load_cell_outages",
         ):
             periods = getattr(self, name)
             checked = check_intervals(owner, name.replace("_", " "), periods, apart=True)
             object.__setattr__(self, name, checked)
+        if self.touch_down is not None and (self.encoder_outages or self.load_cell_outages):
+            raise InputError(
+                f"{owner}: a touch-down phase needs encoder and load cell: ask for touchdown none"
+            )
         if self.enabled is not None:
             checked = check_intervals(owner, "enabled", self.enabled, apart=True)
             object.__setattr__(self, "enabled", checked)
@@ -129,6 +139,16 @@ class Scenario:
             )
 
     @property
+    def operated(self) -> bool:
+        """Whether the controller has to have the operator's interface.
+
+        That is where the operator enables or resets it, and where encoder or load cell give no
+        numbers.
+        """
+        lost = self.encoder_outages or self.load_cell_outages
+        return self.enabled is not None or bool(self.resets or lost)
+
+    @property
     def events(self) -> tuple[tuple[float, str, str], ...]:
         """What happens by itself: time [s], kind and sentence, in order of time."""
         found: list[tuple[float, str, str]] = []
@@ -147,6 +167,8 @@ class Scenario:
             ("sensor", "the payload's sensor gives no numbers", self.sensor_failures),
             ("sensor", "the payload's sensors are stuck", self.stuck_readings),
             ("mru", "the motion reference unit gives no numbers", self.mru_outages),
+            ("sensor", "the drum's encoder gives no numbers", self.encoder_outages),
+            ("sensor", "the load cell gives no numbers", self.load_cell_outages),
         ):
             found += [(start, kind, f"{what} until {end:g} s") for start, end in periods]
         for start, end, extra in self.telemetry_delays:

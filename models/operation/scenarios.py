@@ -82,6 +82,8 @@ def _sensor_loss(_: Case, values: Values) -> dict[str, Any]:
         "sensor": "sensor_failures",
         "stuck": "stuck_readings",
         "mru": "mru_outages",
+        "encoder": "encoder_outages",
+        "load-cell": "load_cell_outages",
     }
     return {"duration": period[1] + _AFTER, which[values["lost"]]: (period,)}
 
@@ -159,10 +161,13 @@ _RECIPES: Mapping[str, ScenarioRecipe] = {
         ramp=10.0,
     ),
     "sensor-loss": ScenarioRecipe(
-        description="link from the payload, its sensor or the reference unit lost, or stuck",
+        description="link from the payload, one of the sensors lost, or the payload's stuck",
         build=_sensor_loss,
         options={
-            "lost": WordOption(words=("telemetry", "sensor", "stuck", "mru"), text="what is lost"),
+            "lost": WordOption(
+                words=("telemetry", "sensor", "stuck", "mru", "encoder", "load-cell"),
+                text="what is lost",
+            ),
             "lasting": _lasting(10.0, "how long"),
             "wait": _WAIT,
         },

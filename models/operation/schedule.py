@@ -24,7 +24,9 @@ class ScheduleBlock:
     time: FloatArray  #: Times from the start of the run (n,) [s].
     #: Displacement, velocity and acceleration asked of the payload (n, 3) [m, m/s, m/s2].
     reference: FloatArray
-    operator: FloatArray  #: 1 where the controller is enabled, 1 where it is reset (n, 2).
+    #: 1 where the controller is enabled, where it is reset, where encoder and where load cell give
+    #: numbers (n, 4).
+    switches: FloatArray
     #: Share of the controller's command that reaches the drive, beyond the static hold (n,) [-].
     engage: FloatArray
     brake: FloatArray  #: 1 while the brake is on (n,).
@@ -59,20 +61,25 @@ class Schedule:
         return ScheduleBlock(
             time=time,
             reference=scenario.profile.at(time),
-            operator=self._operator(clock),
+            switches=self._switches(clock),
             engage=np.where(braked, 0.0, engage),
             brake=braked.astype(np.float64),
         )
 
-    def _operator(self, clock: FloatArray) -> FloatArray:
-        """Return enable and reset (n, 2); a reset lasts for a sample."""
+    def _switches(self, clock: FloatArray) -> FloatArray:
+        """Return enable, reset, encoder and load cell (n, 4); a reset lasts for a sample."""
         enabled, T = self.scenario.enabled, self.sample_time
         enable, reset = np.full(len(clock), enabled is None), np.zeros(len(clock), dtype=np.bool_)
         for begin, end in enabled or ():
             enable |= (clock >= begin) & (clock < end)
         for at in self.scenario.resets:
             reset |= (clock >= at) & (clock < at + T)
-        return np.column_stack((enable, reset)).astype(np.float64)
+        there = [np.ones(len(clock), dtype=np.bool_) for _ in range(2)]
+        outages = self.scenario.encoder_outages, self.scenario.load_cell_outages
+        for valid, periods in zip(there, outages, strict=True):
+            for begin, end in periods:
+                valid &= (clock < begin) | (clock >= end)
+        return np.column_stack((enable, reset, *there)).astype(np.float64)
 
     @property
     def breaks(self) -> tuple[int, ...]:

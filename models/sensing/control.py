@@ -55,7 +55,8 @@ HEARD: tuple[str, ...] = (
 
 _USUAL = ("operator.enable", "encoder.valid", "load_cell.valid")
 
-#: What a step of a controller may have been, and how a run tells of it; the first two are usual.
+#: What a step of a controller may have been, and how a run tells of it; the first two are usual,
+#: the last asks for the brake.
 STATUSES: Mapping[str, str] = MappingProxyType(
     {
         "engaged": "",
@@ -67,6 +68,8 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "fallback": "the controller had no answer in time and fell back on a simpler law",
         "blending": "",
         "held": "the controller is not enabled and holds the drum",
+        "stopping": "the drum's encoder is lost, and the controller stops the drum",
+        "braked": "",
     }
 )
 

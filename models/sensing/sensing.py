@@ -48,7 +48,7 @@ NOISE = ("noise.acceleration", "noise.velocity", "noise.displacement", "noise.te
 _SENT = ("acceleration", "velocity", "displacement")
 _MRU = ("mru.heave", "mru.heave_rate", "mru.valid", "mru.age")
 _REFERENCE = ("reference.displacement", "reference.velocity", "reference.acceleration")
-_OPERATOR = ("operator.enable", "operator.reset")
+_SWITCHES = ("operator.enable", "operator.reset", "encoder.valid", "load_cell.valid")
 _ROUNDS = 100  # of Riccati's recursion, whose error falls at least to a third in each
 _ROUNDING = 1e-9  # of a sample and of a reading: as many of one make the other, whatever is rounded
 _SPEED_WINDOW = 0.01  # time over which a drive counts pulses for the speed [s]
@@ -74,7 +74,7 @@ class SensorModel:
     count per 10 ms.  (Differences of the rounded angle would be rougher the shorter the sample.)
 
     Load cell: first-order low-pass, exact for a tension that is linear between samples, and
-    independent noise at every sample.
+    independent noise at every sample.  Encoder and load cell that give no numbers show 0.
     """
 
     sample_time: float  #: Time between control samples [s].
@@ -127,7 +127,7 @@ class SensorModel:
             "telemetry.age",
             *_MRU,
             *_REFERENCE,
-            *_OPERATOR,
+            *_SWITCHES,
         )
 
     @staticmethod
@@ -153,17 +153,17 @@ class SensorModel:
         telemetry: TelemetryBlock,
         mru: MruBlock,
         references: FloatArray,
-        operator: FloatArray | tuple[float, float] = (1.0, 0.0),
+        switches: FloatArray | tuple[float, ...] = (1.0, 0.0, 1.0, 1.0),
     ) -> FloatArray:
         """Return the rows of a stretch of samples (n, len(row)) from what was drawn for them.
 
         The references are displacement, velocity and acceleration asked of the payload (n, 3), the
-        operator's are enable and reset (n, 2).
+        switches 1 where the controller is enabled, is reset, hears encoder and load cell (n, 4).
         """
-        switches = np.broadcast_to(operator, (len(noise), 2))
+        switched = np.broadcast_to(switches, (len(noise), len(_SWITCHES)))
         link = (telemetry.weights, telemetry.fresh, telemetry.valid, telemetry.age)
         unit = (mru.heave, mru.heave_rate, mru.valid, mru.age)
-        return np.column_stack((noise, *link, *unit, references, switches))
+        return np.column_stack((noise, *link, *unit, references, switched))
 
     def initial(self, raw: npt.ArrayLike) -> FloatArray:
         """Return the state of sensors that have long seen values of `RAW` (8,) at rest."""
@@ -201,9 +201,7 @@ class SensorModel:
             "payload.valid": given["telemetry.valid"],
             "motor.torque": plant["motor.torque"],
             "drive.applied": applied,
-            "encoder.valid": ca.SX(1.0),
-            "load_cell.valid": ca.SX(1.0),
-            **{name: given[name] for name in (*_MRU, *_REFERENCE, *_OPERATOR)},
+            **{name: given[name] for name in (*_MRU, *_REFERENCE, *_SWITCHES)},
         }
         for name in _SENT:
             true, drawn = plant[f"measured.{name}"], given[f"noise.{name}"]
@@ -223,14 +221,14 @@ class SensorModel:
                 }
             known = ca.if_else(given["telemetry.fresh"] == 0, state[f"held.{name}"], arrived)
             after[f"held.{name}"] = seen[f"payload.{name}"] = known
-        seen |= self._encoded(plant)
+        seen |= {name: given["encoder.valid"] * v for name, v in self._encoded(plant).items()}
         tension = plant["rope.tension"]
         if self.load_cell is not None:
             filtered = self._weighed(state, tension)
             after |= {"load_cell.tension": filtered, "load_cell.before": tension}
             rms = self.load_cell.noise_fraction * self.static_tension
             tension = filtered + rms * given["noise.tension"]
-        seen["rope.tension"] = tension
+        seen["rope.tension"] = given["load_cell.valid"] * tension
         return ca.Function(
             "sensors",
             [s, raw, row, applied],

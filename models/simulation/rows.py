@@ -62,7 +62,7 @@ class RowMaker:
         if self.sensors.noisy:  # numbers that nobody reads are not drawn
             noise = self.sensors.noise(self.seed, start, count)
         link = self.telemetry.block(start, count)
-        sensed = self.sensors.rows(noise, link, shown, planned.reference, planned.operator)
+        sensed = self.sensors.rows(noise, link, shown, planned.reference, planned.switches)
         rows[:, columns : -len(FLAGS)] = sensed
         rows[:, -2] = planned.engage
         rows[:, -1] = self._brake(planned.brake, start)

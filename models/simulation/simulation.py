@@ -256,6 +256,12 @@ def prepare(
             f"scenario {scenario.name}: {controller.name} has no touch-down phase: wrap it in "
             "synth.controllers.touching_down, or ask for touchdown none"
         )
+    lost = scenario.encoder_outages or scenario.load_cell_outages
+    if lost and not (holds_brake(controller) or getattr(controller, "operated", False)):
+        raise InputError(
+            f"scenario {scenario.name}: {controller.name} does not know of a lost encoder or load "
+            "cell: wrap it in synth.controllers.operated"
+        )
     sample_time = check_range(
         controller.name, "sample_time", controller.sample_time, low=0.0, unit="s", open_low=True
     )
@@ -286,7 +292,7 @@ def prepare(
         start=_initial_state(plant, rest, scenario),
         hold=rest.command,
         recursion=recursion,
-        with_status=knows and (scenario.enabled is not None or bool(scenario.resets)),
+        with_status=knows and scenario.operated,
     )
     return Simulation(
         case=case,

@@ -1,9 +1,9 @@
-"""Trips of the brake in mid-run: overspeed, and the end of the drum's travel.
+"""Trips of the brake in mid-run: overspeed, the end of the drum's travel, a lost encoder.
 
-A supervisor beside the controller watches a few signals, each in its range.  The first that
-leaves it closes the brake and takes the command back to the static one; the run goes on with the
-brake closed, and the event says what happened.  `models.simulation.simulate` asks after every
-sample.
+A supervisor beside the controller watches a few signals, each in its range, and whether the
+controller asks for the brake.  The first that leaves it closes the brake and takes the command back
+to the static one; the run goes on with the brake closed, and the event says what happened.
+`models.simulation.simulate` asks after every sample.
 """
 
 import math
@@ -15,6 +15,8 @@ import numpy as np
 from ..basics import FloatArray
 from ..case import Case
 from ..run import Event
+from ..sensing import STATUSES
+from .closed_loop import STATUS
 
 # Hoists have a switch at 1.1 to 1.25 times their highest speed: a drive at the limit of its power
 # cannot hold a load that runs away.
@@ -34,7 +36,7 @@ class TripLimit:
 
 
 def trip_limits(case: Case) -> tuple[TripLimit, ...]:
-    """Return the limits of a case: overspeed, the stroke, and the rope that the drum has."""
+    """Return the limits of a case: overspeed, stroke, the rope that the drum has, the encoder."""
     fastest = OVERSPEED * case.winch.speed_limit
     text = f"motor at {{value:.4g}} rad/s, beyond {fastest:.4g} rad/s: brake"
     limits = [
@@ -51,6 +53,9 @@ def trip_limits(case: Case) -> tuple[TripLimit, ...]:
         limits.append(TripLimit(signal="rope.length", high=most, kind="rope-out", text=text))
     text = "all rope is hauled in, the payload is at the hook: brake"
     limits.append(TripLimit(signal="rope.length", low=1.0, kind="rope-in", text=text))
+    text = "without the drum's encoder the controller has stopped the drum: brake"
+    asked = tuple(STATUSES).index("braked") - 0.5  # the last of them
+    limits.append(TripLimit(signal=STATUS, high=asked, kind="encoder", text=text))
     return tuple(limits)
 
 

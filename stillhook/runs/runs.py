@@ -30,7 +30,7 @@ EXTREMES: Mapping[str, tuple[str, bool]] = {
 }
 """Most probable extremes by name: of which signal, and whether its minimum."""
 
-TRIPS = ("overspeed", "stroke", "rope-out", "rope-in")
+TRIPS = ("overspeed", "stroke", "rope-out", "rope-in", "encoder")
 """Kinds of events in which the brake ends the controller's work (`models.simulation.trips`)."""
 
 MAIN: Mapping[str, str] = {

@@ -44,14 +44,14 @@ class Series:
     ) -> Series:
         """Prepare, the controller made for the scenario's own case (`Scenario.case_for`).
 
-        Where the operator enables or resets it, it gets the interface (`operated`).
+        Where the scenario asks for it (`Scenario.operated`) it gets the interface (`operated`).
 
         Raises InputError, SolverError as `models.simulation.prepare`.
         """
         if options.duration is not None:
             scenario = replace(scenario, duration=options.duration)
         own = scenario.case_for(case)
-        if scenario.enabled is not None or scenario.resets:
+        if scenario.operated:
             ramp = {"ramp": scenario.ramp} if scenario.ramp > 0.0 else {}
             controller = operated(controller, own, rate=scenario.rate, **ramp)
         if scenario.touch_down is not None:

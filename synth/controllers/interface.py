@@ -15,6 +15,12 @@ While `operator.enable` is 0, and where the law has no number to give, a drum-sp
 drum where it stands.  Each time it begins with the drum's speed, which then goes, and with the
 integral that makes its first command the one that the drive has followed: there is no step.
 
+Without the drum's encoder nobody knows how the drum turns, and no law commands it.  From the speed
+that was seen last, the motor's equation of motion says which command stops the drum in `STOPPING`
+seconds; the command goes over to that from the one that the drive followed, and then the brake is
+asked for.  It stays until the operator resets the controller, or disables it and the encoder is
+back; an encoder that is back before is a fresh start of the law.
+
 The law runs all the time, and hears what the drive really did (`drive.applied`), so that estimators
 are settled and integrators have followed it.  Enabled, it takes the command over in `ramp` seconds,
 by 3 s^2 - 2 s^3.  Until then its set point is where the load is, with its speed and acceleration,
@@ -28,6 +34,7 @@ point that is no number keeps its place.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -69,10 +76,12 @@ _SHOWN_BY = {
     HEARD.index("load_cell.valid"): [HEARD.index("rope.tension")],
 }
 _RESET = HEARD.index("operator.reset")
+STOPPING = 1.0  #: Time in which a drum without encoder is stopped [s].
 _TRIM = 0.05  # rate at which the drum returns to its place, of the loop's bandwidth
 _STOPS = 0.2  # of the ramp: time constant with which a drum that turns at first is stopped
 _HUGE = 1e12
 _ROUNDING = 1e-9
+_WHOLE = 1.0 - _ROUNDING
 
 
 def operated(
@@ -214,7 +223,7 @@ class _Interface:
     """The formulas on both sides of a law: `set_point` before it, `command` after it."""
 
     ASKED = 6  # states of `set_point`, all zero at first
-    GIVEN = 9  # states of `command`, the last of them the status
+    GIVEN = 11  # states of `command`, the last of them the status
 
     loop: DrumSpeedLoop
     most: float  #: Beyond it no drive gives more [command].
@@ -255,13 +264,19 @@ class _Interface:
     def command(self, state: ca.SX, m: Signals, wanted: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the next state, whose last is the status, and the command for what a law wants."""
         loop, T = self.loop, self.loop.sample_time
-        begun, place, there, speed, integral, held, since, last, status = ca.vertsplit(state)
+        begun, place, there, speed, integral, held, since, last, *stop, status = ca.vertsplit(state)
         good, enabled = _finite(wanted), m["operator.enable"] > 0.5
-        on, was_on = ca.logic_and(enabled, good), ca.logic_and(begun, ca.logic_not(_holds(status)))
+        turns = ca.logic_and(m["encoder.valid"] > 0.5, _finite(m["motor.speed"] + m["drum.haul"]))
+        # How fast the drum turned when that was seen last, and how far it has been stopped since.
+        turned, stopped = ca.if_else(turns, m["motor.speed"], stop[0]), stop[1]
+        freed = ca.logic_and(turns, ca.logic_or(ca.logic_not(enabled), stopped < _WHOLE))
+        more = ca.if_else(freed, -T / STOPPING, T / STOPPING)
+        stopped = ca.fmax(0.0, ca.fmin(1.0, stopped + more))
+        on = ca.logic_and(ca.logic_and(enabled, good), freed)
+        was_on = ca.logic_and(begun, ca.logic_not(_holds(status)))
         known = ca.if_else(begun, last, loop.static)
         applied = ca.if_else(_finite(m["drive.applied"]), m["drive.applied"], known)
-        turns = ca.logic_and(m["encoder.valid"] > 0.5, _finite(m["motor.speed"] + m["drum.haul"]))
-        now = ca.if_else(turns, m["motor.speed"], speed)
+        now = ca.if_else(turns, turned, ca.if_else(was_on, turned, speed))
         haul = ca.if_else(turns, m["drum.haul"], ca.if_else(begun, there, 0.0))
         # The drum begins to be held with the speed it has and the command that the drive follows.
         begins = ca.logic_or(ca.logic_not(begun), ca.logic_and(was_on, ca.logic_not(on)))
@@ -278,6 +293,12 @@ class _Interface:
         share = since * since * (3.0 - 2.0 * since)
         blended = ca.if_else(since < 1.0, hold + share * (wanted - hold), wanted)
         asked = ca.if_else(on, blended, hold)
+        share = stopped * stopped * (3.0 - 2.0 * stopped)
+        slows = 6.0 * stopped * (1.0 - stopped) / STOPPING
+        motor = loop.motor
+        stops = motor.feed * (1.0 - share) - motor.inertia / motor.torque_gain * slows
+        stops = loop.static + turned * stops
+        asked = ca.if_else(stopped > 0.0, asked + share * (stops - asked), asked)
         command = ca.fmax(-self.most, ca.fmin(self.most, asked))
         if self.slew < math.inf:
             before = ca.if_else(begun, last, applied)
@@ -289,10 +310,13 @@ class _Interface:
             ("blind", m["payload.age"] > min(self.deaf, _HUGE)),
             ("fallback", ca.logic_not(good)),
             ("held", ca.logic_not(enabled)),
+            ("stopping", stopped > 0.0),
+            ("braked", stopped >= _WHOLE),
         ):
             status = ca.if_else(so, _CODE[name], status)
         place = place + rope_speed * T
-        return ca.vertcat(1.0, place, haul, speed, drum, since, command, status), command
+        stop = [turned, stopped]
+        return ca.vertcat(1.0, place, haul, speed, drum, since, command, *stop, status), command
 
     def functions(self) -> tuple[ca.Function, ca.Function]:
         """Return both as functions of state, and of measurement with status or with command."""
@@ -330,7 +354,8 @@ def _heard(recursion: Recursion) -> frozenset[str]:
 
 def _holds(status: ca.SX) -> ca.SX:
     """Return whether the drum was held."""
-    return ca.logic_or(status == _CODE["held"], status == _CODE["fallback"])
+    held = (status == _CODE[name] for name in ("held", "fallback", "stopping", "braked"))
+    return functools.reduce(ca.logic_or, held)
 
 
 def _gone(s: ca.SX, start: ca.SX, lasts: float) -> ca.SX:

@@ -97,6 +97,7 @@ def test_nothing_fails_where_nothing_is_asked():
 def test_every_fault_becomes_part_of_the_scenario():
     sizes = {"at": 10.0, "lasting": 20.0, "telemetry_outage": 3.0, "sensor_outage": 4.0}
     sizes |= {"stuck_readings": 2.0, "mru_spike": 1.5}
+    sizes |= {"encoder_outage": 7.0, "load_cell_outage": 8.0}
     sizes |= {"mru_outage": 5.0, "brake_trip": 6.0, "delay_step": 0.1}
     sizes |= {"mru_heave_bias": 0.2, "mru_rate_bias": -0.1, "torque_limit": 0.6, "power_limit": 0.5}
     assert set(sizes) == set(FAULTS)
@@ -105,6 +106,8 @@ def test_every_fault_becomes_part_of_the_scenario():
     assert found.sensor_failures == ((10.0, 14.0),)
     assert found.mru_outages == ((10.0, 15.0),)
     assert found.brake_trips == ((10.0, 16.0),)
+    assert found.encoder_outages == ((10.0, 17.0),)
+    assert found.load_cell_outages == ((10.0, 18.0),)
     assert found.telemetry_delays == ((10.0, 30.0, 0.1),)
     assert found.stuck_readings == ((10.0, 12.0),)
     bias, *spikes = found.mru_biases

@@ -182,6 +182,20 @@ class TestSchedule:
         gone = during(BUSY.telemetry_outages, samples, sample_time)
         assert np.flatnonzero(gone)[0] == 10 * per_second
 
+    @pytest.mark.parametrize(
+        ("field", "column"), [("encoder_outages", 2), ("load_cell_outages", 3)]
+    )
+    def test_encoder_and_load_cell_answer_but_in_their_outages(self, field, column):
+        one = scenario(**{field: ((1.1, 2.3), (5.0, 5.5))})
+        rows = Schedule(scenario=one, sample_time=0.1).block(0, 100).switches
+        assert np.flatnonzero(rows[:, column] == 0.0).tolist() == [*range(11, 23), *range(50, 55)]
+        assert np.all(np.delete(rows, column, axis=1) == [1.0, 0.0, 1.0])
+
+    def test_a_touch_down_phase_cannot_do_without_encoder_and_load_cell(self):
+        for field in ("encoder_outages", "load_cell_outages"):
+            with pytest.raises(InputError, match="a touch-down phase needs encoder and load cell"):
+                scenario(touch_down=TouchDown(), **{field: ((1.0, 2.0),)})
+
     def test_the_reference_is_the_profile(self):
         rows = Schedule(scenario=BUSY, sample_time=0.25).block(60, 100)
         np.testing.assert_array_equal(rows.reference, BUSY.profile.at(rows.time))
@@ -391,10 +405,13 @@ class TestLibrary:
             ("sensor", "sensor_failures"),
             ("stuck", "stuck_readings"),
             ("mru", "mru_outages"),
+            ("encoder", "encoder_outages"),
+            ("load-cell", "load_cell_outages"),
         ):
             found = scenario_named("sensor-loss", crane, lost=lost, lasting="3 s", wait=50)
             assert getattr(found, field) == ((50.0, 53.0),)
-        told = "lost must be one of telemetry, sensor, stuck, mru, got 'x'"
+            assert found.operated == (lost in ("encoder", "load-cell"))
+        told = "lost must be one of telemetry, sensor, stuck, mru, encoder, load-cell, got 'x'"
         with pytest.raises(InputError, match=told):
             scenario_named("sensor-loss", crane, lost="x")
 

@@ -339,6 +339,7 @@ class TestRows:
         raw = at_rest(1, measured__displacement=0.2, rope__tension=4e5)
         start = model.initial(raw[0])
         row = np.zeros(len(model.row))
+        row[[model.row.index(f"{name}.valid") for name in ("encoder", "load_cell")]] = 1.0
         after, seen = model.function(start, raw[0], row, 0.0)
         np.testing.assert_allclose(np.asarray(after).ravel(), start, rtol=1e-15)
         named = dict(zip(HEARD, np.asarray(seen).ravel(), strict=True))

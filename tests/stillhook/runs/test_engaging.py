@@ -9,6 +9,7 @@ from former_cases import load_case
 import stillhook as sh
 from models.operation import scenario_named
 from models.sensing import STATUSES
+from models.simulation import prepare
 from mpc.linear import LinearMPC
 from mpc.winch import ProcessNoise, Weights
 from synth.controllers import BrakeOn, VelocityFeedForward, operated
@@ -98,6 +99,68 @@ def test_a_lost_link_is_told_of_a_law_in_the_loop() -> None:
     )
     assert runs[0].timings.statuses["blind"] * 0.01 == pytest.approx(9.0, abs=0.1)
     assert any("heard nothing" in event.text for event in runs[0].events)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("feed-forward", 1), ("constant-tension", 4), ("mpc", 2)]
+)
+def test_without_encoder_the_drum_is_stopped_within_a_second_and_braked(kind, seed) -> None:
+    controller = LinearMPC(case_of(), weights=weights()) if kind == "mpc" else kind
+    step = 0.05 if kind == "mpc" else 0.02
+    run = sh.simulate(
+        case_of(),
+        controller,
+        scenario="sensor-loss",
+        options={"lost": "encoder", "wait": ON, "lasting": 10.0},
+        duration=OFF,
+        settle=5.0,
+        store_step=step,
+        seeds=[seed],
+    )[0]
+    lost = float(over(run, "motor.speed", ON - step, ON)[0])
+    usual = np.abs(np.diff(over(run, "drive.command", 30.0, ON))).max()
+    during = over(run, "drive.command", ON - 1.5 * step, ON + 1.0)
+    assert np.abs(np.diff(during)).max() <= 1.5 * usual + 0.02 * np.ptp(during)
+    # Stopped before the brake, which has little to do.
+    assert abs(lost) > 10.0 or kind == "constant-tension"
+    assert np.abs(over(run, "motor.speed", ON + 1.0, OFF)).max() < max(0.05 * abs(lost), 1.5)
+    assert (over(run, "brake.on", 1.0, ON + 0.99) == 0.0).all()
+    (trip,) = (event for event in run.events if event.kind == "encoder")
+    assert trip.time == pytest.approx(ON + 1.0, abs=2.0 * step)
+    # For good, though the encoder is back after ten seconds.
+    assert (over(run, "brake.on", ON + 2.0, OFF) == 1.0).all()
+    assert np.ptp(over(run, "drum.haul", ON + 2.0, OFF)) < 1e-6
+    assert run.timings.statuses["stopping"] == pytest.approx(1.0 / run.sample_time, abs=2.0)
+
+
+def test_without_load_cell_constant_tension_holds_the_drum_and_mpc_goes_on() -> None:
+    moved = {}
+    for kind in ("constant-tension", "mpc"):
+        controller = LinearMPC(case_of(), weights=weights()) if kind == "mpc" else kind
+        options = {"lost": "load-cell", "wait": 20.0, "lasting": 40.0}
+        run = sh.simulate(
+            case_of(),
+            controller,
+            scenario="sensor-loss",
+            options=options,
+            duration=60.0,
+            settle=5.0,
+            seeds=[3],
+        )[0]
+        assert not {event.kind for event in run.events} & {"encoder", "overspeed", "diverged"}
+        moved[kind] = np.ptp(over(run, "drum.haul", 35.0, 60.0))
+        left = over(run, "payload.displacement", 35.0, 60.0).std()
+        held = over(run, "hook.heave", 35.0, 60.0).std()
+        assert (left < 0.2 * held) == (kind == "mpc")
+    assert moved["constant-tension"] < 0.1 * moved["mpc"]
+
+
+def test_a_law_alone_is_not_run_without_encoder_or_load_cell() -> None:
+    for lost in ("encoder", "load-cell"):
+        hold = scenario_named("sensor-loss", case_of(), lost=lost)
+        with pytest.raises(sh.InputError, match="feed-forward does not know of a lost encoder or"):
+            prepare(case_of(), VelocityFeedForward(case_of()), hold)
+        assert prepare(case_of(), BrakeOn(case_of()), hold).scenario is hold
 
 
 def test_a_reset_is_told_and_begins_anew() -> None:

@@ -25,6 +25,7 @@ from synth.controllers import (
     VelocityFeedForward,
     operated,
 )
+from synth.structures import DrumSpeedLoop
 from synth.structures.recursive import at_rest
 
 MAKERS = {
@@ -276,6 +277,83 @@ def test_without_a_sensor_the_laws_do_without_its_numbers() -> None:
         held[AT["operator.enable"]] = 0.0
         found = commands(controller, np.tile(row if kind[0] == "c" else held, (900, 1)))
         assert found == pytest.approx(still("subsea-crane")[APPLIED], rel=1e-9)
+
+
+def lost_from(name: str, first: int, last: int, n: int) -> np.ndarray:
+    """Measurements without encoder in between, which then shows zero."""
+    rows = seen(name, n, seed=10, size=1e-3)
+    rows[first:last, AT["encoder.valid"]] = 0.0
+    rows[first:last, [AT["motor.speed"], AT["drum.haul"]]] = 0.0
+    return rows
+
+
+@every
+def test_without_encoder_the_command_goes_over_to_what_holds_the_load(name: str, kind: str) -> None:
+    T = law(name, kind).sample_time
+    n, second = round(8.0 / T), round(1.0 / T)
+    static = DrumSpeedLoop.from_case(load_case(name), sample_time=T).static
+    rows = lost_from(name, n, 2 * n, 3 * n)
+    # What the law asked last is far from that.
+    rows[:n, AT["motor.speed"]] += 2.0
+    for controller in (made(name, kind), operated(Stepped(law(name, kind)), load_case(name))):
+        found = commands(controller, rows)
+        assert controller.status == "braked"
+        far = np.abs(found[n - 1 : n + second] - static).max()
+        steps = np.abs(np.diff(found[n - 1 :]))
+        assert steps[0] < 0.01 * far
+        # The steepest of 3 s^2 - 2 s^3 is 1.5 in a second.
+        assert steps[1:second].max() <= 5.0 * T * far
+        # What holds the load, under the brake, though the encoder is back.
+        assert found[n + second :] == pytest.approx(static, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_drum_is_slowed_down_from_the_speed_it_had(name: str) -> None:
+    controller, T = made(name, "feedback"), law(name, "feedback").sample_time
+    n, half = round(2.0 / T), round(0.5 / T)
+    rows = np.tile(still(name), (2 * n, 1))
+    rows[:, AT["operator.enable"]] = rows[n:, AT["encoder.valid"]] = 0.0
+    rows[n - 1, AT["motor.speed"]] = 10.0
+    loop = DrumSpeedLoop.from_case(load_case(name), sample_time=T)
+    # It is to turn half as fast then, and to slow down by 1.5 times that in a second.
+    motor = loop.motor
+    wanted = 5.0 * motor.feed - 15.0 * motor.inertia / motor.torque_gain
+    found = commands(controller, rows)[n + half - 1] - loop.static
+    # Half of it by then; the loop that held the drum follows the command that goes out.
+    assert 0.4 * wanted < found < wanted
+
+
+def test_the_brake_is_asked_for_until_the_operator_says_otherwise() -> None:
+    name, kind = "thesis-1975", "feedback"
+    told: dict[str, list[str]] = {}
+    for case in ("lost", "glitch", "reset", "disabled", "still lost"):
+        controller = made(name, kind)
+        rows = lost_from(name, 100, 150 if case == "glitch" else 300, 1200)
+        if case == "reset":
+            rows[500, AT["operator.reset"]] = 1.0
+        elif case == "disabled":
+            rows[500:510, AT["operator.enable"]] = 0.0
+        elif case == "still lost":
+            rows[200, AT["operator.reset"]] = rows[300:, AT["encoder.valid"]] = 0.0
+            rows[500:510, AT["operator.enable"]] = 0.0
+        controller.reset()
+        told[case] = []
+        for k, row in enumerate(rows):
+            controller.step(Measurement(row), 0.01 * k)
+            told[case].append(controller.status)
+    for case, own in told.items():
+        assert set(own[100:149]) == {"stopping"}, case
+        if case != "glitch":
+            assert own[198] == "stopping"
+            assert set(own[200:500]) == {"braked"}, case
+    assert set(told["lost"][500:]) == set(told["still lost"][520:]) == {"braked"}
+    # Back before the drum was stopped: the law takes over again, without the brake.
+    assert "braked" not in told["glitch"]
+    assert told["glitch"][-1] in ("engaged", "limited")
+    assert told["reset"][500] == "blending"
+    assert set(told["reset"][1010:]) <= {"engaged", "limited"}
+    assert "braked" not in told["disabled"][500:]
+    assert set(told["disabled"][1130:]) <= {"engaged", "limited"}
 
 
 @pytest.mark.parametrize("kind", MAKERS)
