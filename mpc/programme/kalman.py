@@ -97,9 +97,6 @@ class SampledFilter:
         For how many samples each signal was not believed, (ny,).
     """
 
-    #: Gains of the first samples at which all signals are there, (n, ny) each.
-    first: Sequence[FloatArray] = ()
-
     def __init__(
         self,
         A: FloatArray,
@@ -119,6 +116,8 @@ class SampledFilter:
         self._outer = np.outer(scale, scale)
         self._Q, self._P0 = G @ G.T / self._outer, P / self._outer
         self._R, self._eye = R, np.eye(len(R))
+        self._start: FloatArray | None = None
+        self._first: list[FloatArray] = []
         self._added: dict[bytes, FloatArray] = {}
         self._steady: dict[bytes, tuple[FloatArray, FloatArray]] = {}
         for key, own in sets.items():
@@ -129,11 +128,22 @@ class SampledFilter:
                 self._steady[key] = P, kalman_gain(self._C, np.ones(len(R)), P, there)
         self.reset()
 
+    def begin_with(self, P: FloatArray, samples: int) -> None:
+        """Take a covariance (n, n) as that of the first prediction, and hold what follows from it.
+
+        For so many samples the gains with all signals are made beforehand; the covariance is
+        carried on from P itself as soon as one of the signals is missing among them.
+        """
+        self._start = self._P = P / self._outer
+        everything = np.ones(len(self._R), dtype=np.bool_)
+        self._first = [self.at(everything) for _ in range(samples)]
+        self.reset()
+
     def reset(self) -> None:
         """Forget everything: all is at rest."""
         self.state = np.zeros(len(self._P0))
         self.unheard = np.zeros(len(self._C), dtype=np.int64)
-        self._heard = 0  # samples with all signals, as far as they have gains of their own
+        self._heard = 0  # samples with gains made beforehand
         self._begin()
 
     def _begin(self) -> None:
@@ -154,8 +164,12 @@ class SampledFilter:
         they tell of something else than usual, C (ny, n) says of what.
         """
         self.unheard = np.where(there, 0, self.unheard + 1)
-        if self._heard < len(self.first) and there.all():
-            gain = self.first[self._heard]
+        if self._heard < len(self._first) and not there.all():
+            # What they hold of the constants would be lost on a steady gain.
+            assert self._start is not None
+            self._P, self._heard = self._start, len(self._first)
+        if self._heard < len(self._first):
+            gain = self._first[self._heard]
             self._heard += 1
         else:
             gain = self.at(there, C)

@@ -73,12 +73,12 @@ class WinchEstimator(SampledFilter):
             if model.depth[name]:
                 self._sent[model.first[name]] = felt
         self.gate = SignalGate(model)
-        self.first = _first_gains(model)
         # For the gains the constants are forgotten in an hour: one of which nothing tells would
         # else drift for ever.
         A, at = model.A.copy(), np.arange(model.constants_at.start, model.constants_at.stop)
         A[at, at] = math.exp(-T / _FORGOTTEN)
         super().__init__(A, model.C, model.G, model.R, model.covariance, _sets(model))
+        self.begin_with(_at_first(model), round(_STARTING / T))
 
     @override
     def reset(self) -> None:
@@ -125,12 +125,14 @@ class WinchEstimator(SampledFilter):
         # that says "not valid" takes a signal out before its number is looked at.
         age, reading = float(shown[_AGE]), shown[_AT]
         age = age if math.isfinite(age) else self._usual
-        rows = self._late(age)
+        # What is not shown is not late: a row for an age that grows would have no steady gain.
+        told = shown[_FRESH] > 0.5 and age <= self._oldest
+        rows = self._late(age) if told else self._rows
         expected = rows @ ahead + self._rest
         error = reading - expected
         error -= self._felt * winch.extra_drag(float(self._velocity @ ahead))
         there = np.abs(error) < _HUGE
-        if not shown[_FRESH] > 0.5 or age > self._oldest:
+        if not told:
             there[_TELEMETRY] = False
         if shown[_UNIT] <= 0.5:
             there[_REFERENCE] = False
@@ -176,8 +178,8 @@ def _sets(model: PredictionModel) -> dict[bytes, FloatArray]:
     return found
 
 
-def _first_gains(model: PredictionModel) -> list[FloatArray]:
-    """Return the gains after a start at which the constants are not known, (k, n, ny)."""
+def _at_first(model: PredictionModel) -> FloatArray:
+    """Return the covariance at a start, where the constants are not known, (n, n)."""
     winch = model.winch
     at = np.arange(model.constants_at.start, model.constants_at.stop)
     P = np.array(model.covariance)
@@ -187,6 +189,4 @@ def _first_gains(model: PredictionModel) -> list[FloatArray]:
     # A load of another weight hangs lower: the winch's state is not known any better at first.
     moved = winch.moved[:, 0]
     P[: winch.size, : winch.size] += (_LOWER**2) * np.outer(moved, moved)
-    run = SampledFilter(model.A, model.C, model.G, model.R, P, {})
-    everything = np.ones(len(MEASURED), dtype=np.bool_)
-    return [run.at(everything) for _ in range(round(_STARTING / winch.sample_time))]
+    return P

@@ -179,7 +179,7 @@ def test_a_link_whose_age_varies_has_the_first_gains_too(estimator):
     assert C is not estimator._rows
     # No numbers have been turned away, and nothing was expected but rest.
     np.testing.assert_allclose(
-        estimator.state, estimator.first[0] @ (C @ chi), rtol=1e-6, atol=1e-9
+        estimator.state, estimator._first[0] @ (C @ chi), rtol=1e-6, atol=1e-9
     )
     estimator.reset()
 
@@ -306,3 +306,27 @@ def test_who_hears_the_load_by_nothing_does_as_well_as_feed_forward():
     deaf, feed_forward = rms.values()
     assert deaf < 1.2 * feed_forward
     assert controller.counts["fallback"] == 0
+
+
+def test_a_telegram_that_is_gone_has_a_steady_gain_however_old_it_grows(estimator):
+    model = estimator.model
+    chi = np.zeros(model.size)
+    estimator.reset()
+    for _ in range(300):
+        estimator.update(shown(model, chi))
+    for k in range(3000):
+        gone = shown(model, chi).values.copy()
+        gone[AT["payload.valid"]], gone[AT["payload.age"]] = 0.0, 0.1 + T * k
+        estimator.update(Measurement(gone))
+        if estimator._held is not None:
+            break
+    assert estimator._held is not None
+    estimator.reset()
+
+
+def test_messages_that_are_lost_from_the_start_do_not_lose_the_load():
+    """On gains that were made for all signals the constants are not learnt any more."""
+    lost = {"sensors.telemetry.dropout": 0.35, "sensors.telemetry.dropout_length": "55 ms"}
+    case = models.load_case("subsea-crane").replace(lost)
+    run = sh.simulate(case, LinearMPC(case), seeds=[0], duration=120.0, settle=40.0)[0]
+    assert run.statistics["payload.displacement"].standard_deviation < 0.05
