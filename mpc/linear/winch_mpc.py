@@ -402,13 +402,18 @@ class WinchMPC(ABC):
         asked = self._unlimited[: winch.size] @ winch.moved @ reference
         return float(asked - self._unlimited @ chi) / self.programme.unit
 
-    def _hear(self, measurement: Measurement, time: float, applied: float) -> FloatArray:
-        """Return the estimate of a sample, (n,), and let the fallback hear it too."""
+    def _hear(
+        self, measurement: Measurement, time: float, applied: float, *, partly: bool = False
+    ) -> FloatArray:
+        """Return the estimate of a sample, (n,), and let the fallback hear it too.
+
+        Where the drive was to cut the torque for a part of it, the end tells nothing of the mean.
+        """
         self._counts["steps"] += 1
         shown = measurement.values
         left_out = self._sent - float(shown[_APPLIED])
         cut = self.window.follow(float(shown[_TORQUE]), left_out, float(shown[_SPEED]))
-        self.inertia.update(shown, cut)
+        self.inertia.update(shown, cut, partly)
         self._other = math.nan
         if self._fallback is not None:
             self._other = float(self._fallback.step(measurement, time))

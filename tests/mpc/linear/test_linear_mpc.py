@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cvxpy_programme import oracle
 from former_cases import load_case
-from mpc_cases import WEIGHTS, case_of, controller_of
+from mpc_cases import WEIGHTS, case_of, controller_of, off
 from sea_predictor import SeaPredictor
 
 import models
@@ -647,19 +647,6 @@ def test_moves_stay_below_the_breakdown_torque_at_the_planned_speeds() -> None:
     assert most < case.winch.power_limit / (2.0 * base)
     assert high * unit + rest == pytest.approx(most, rel=1e-9)
     assert low * unit + rest == pytest.approx(-most, rel=1e-9)
-
-
-def off(case: models.Case, inertia: float = 1.0, torque: float = 1.0) -> models.Case:
-    """A case whose motor is another; a DC motor's current goes with its torque."""
-    winch = case.winch
-    return case.replace(
-        {
-            "winch.motor.inertia": inertia * winch.motor.inertia,
-            "winch.gearbox.inertia": inertia * winch.gearbox.inertia,
-            "winch.drive.torque_peak": torque * winch.drive.torque_peak,
-            "winch.drive.current_peak": torque * (winch.drive.current_peak or math.nan),
-        }
-    )
 
 
 def test_a_torque_limit_that_is_lower_than_told_is_learnt_and_told_of():
