@@ -28,6 +28,7 @@ SCRIPTS: Mapping[str, str] = {
     "mpc_steps.csv": "benchmarks/mpc_speed.py",
     "other_seas.csv": "docs/make/other_seas.py",
     "pareto.csv": "docs/make/robust.py",
+    "preview.csv": "docs/make/preview.py",
     "random_starts.csv": "docs/make/random_starts.py",
     "robust.csv": "docs/make/robust.py",
     "said_mpc.csv": "docs/make/said_mpc.py",
