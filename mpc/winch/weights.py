@@ -43,7 +43,7 @@ DOUBTS: Mapping[str, float] = {
 }
 #: Stiffness of the rope that plans are made on, over that of the case, where the drive saturates: a
 #: stiffer one pays there though nothing is doubted, which no loop without limits shows (78 mm by
-#: 1.4, 91 by 1.0 on the thesis's winch at 2.43 m, with the rest of the weights the same).
+#: 1.4, 91 by 1.0 on the thesis's winch at 2.43 m, with the other weights tuned to each).
 STIFFER = 1.4
 _SATURATED = 4.0  # standard deviations of the torque that have to fit within the peak
 # Logarithms to base ten of (weight, force, torque, rope, sensors, the plan's stiffness): where good
