@@ -68,6 +68,57 @@ def mpc(case: sh.Case, **options: object) -> sh.LinearMPC:
     return sh.LinearMPC(case, **{"weights": weights(), **options})
 
 
+HEIGHTS = {"a": 1.25, "b": 1.9, "c": 2.43, "d": 3.75}  # m
+#: Drives that are not as told: inertia at the motor and torque limit, over those told.
+DRIVES = {"heavy": (1.3, 1.0), "light": (0.7, 1.0), "weak": (1.0, 0.8)}
+
+
+def with_drive(case: sh.Case, inertia: float, torque: float) -> sh.Case:
+    """Return a case with another motor; a DC motor's current goes with its torque."""
+    own = case.winch
+    return case.replace(
+        {
+            "winch.motor.inertia": inertia * own.motor.inertia,
+            "winch.gearbox.inertia": inertia * own.gearbox.inertia,
+            "winch.drive.torque_peak": torque * own.drive.torque_peak,
+            "winch.drive.current_peak": torque * (own.drive.current_peak or math.nan),
+        }
+    )
+
+
+def believing(case: sh.Case) -> sh.LinearMPC:
+    """Return a controller that learns nothing of its drive."""
+    controller = mpc(case)
+    controller.window.follow = lambda *heard: False  # type: ignore[method-assign]
+    controller.inertia.update = lambda *heard: None  # type: ignore[method-assign]
+    return controller
+
+
+def drives(effort: Effort) -> Mapping[str, float]:
+    """Drives that are not as told: who learns nothing, who learns, and who is told [mm]."""
+    found = {}
+    for at, height in HEIGHTS.items():
+        case = winch(height)
+        found[f"told_{at}"] = left(case, mpc(case), effort)
+        for name, other in DRIVES.items():
+            true = with_drive(case, *other)
+            found[f"{name}_{at}1"] = left(true, believing(case), effort)
+            found[f"{name}_{at}2"] = left(true, mpc(case), effort)
+            found[f"{name}_{at}3"] = left(true, mpc(true), effort)
+    return found
+
+
+def _drives_table() -> str:
+    """Return the template of the table of `drives`."""
+    rows = {"inertia +30 %": "heavy", "inertia -30 %": "light", "torque -20 %": "weak"}
+    cells = {"as told": [f"{{told_{at}}}" for at in HEIGHTS]}
+    for label, name in rows.items():
+        cells[label] = [", ".join(f"{{{name}_{at}{k}}}" for k in (1, 2, 3)) for at in HEIGHTS]
+    lines = ["| drive | " + " | ".join(f"{height:g} m" for height in HEIGHTS.values()) + " |"]
+    lines.append("| --- |" + " --- |" * len(HEIGHTS))
+    return "\n".join([*lines, *(f"| {name} | {' | '.join(of)} |" for name, of in cells.items())])
+
+
 class Deaf:
     """A controller that some sensors tell nothing, or nothing true, for a minute out of two.
 
@@ -425,6 +476,12 @@ SAYINGS = [
         name="moves",
         template="({nonlinear} and {linear} mm at 2.43 m)",
         work=moves,
+    ),
+    Saying(
+        page=PAGE,
+        name="drives",
+        template=_drives_table(),
+        work=drives,
     ),
     Saying(
         page=PAGE,

@@ -31,6 +31,7 @@ SCRIPTS: Mapping[str, str] = {
     "outages.csv": "docs/make/outages.py",
     "outages_designs.csv": "docs/make/outages.py",
     "pareto.csv": "docs/make/robust.py",
+    "preview.csv": "docs/make/preview.py",
     "random_starts.csv": "docs/make/random_starts.py",
     "robust.csv": "docs/make/robust.py",
     "said_mpc.csv": "docs/make/said_mpc.py",

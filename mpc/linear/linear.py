@@ -19,7 +19,6 @@ from models.sensing import HEARD, Measurement
 from .winch_mpc import WinchMPC, WinchOptions
 
 _SAME = 1e-3  # of the peak torque
-_OTHER = 0.02  # of the motor's inertia: what is less is no difference
 _TORQUE, _SPEED = HEARD.index("motor.torque"), HEARD.index("motor.speed")
 
 
@@ -77,9 +76,10 @@ class LinearMPC(WinchMPC):
     predictor
         Where the hook's path comes from: ``bank`` (Wiener forecasts of the sea that is told and of
         others, by the errors they make), ``kalman`` (the estimator's own sea), ``ar`` (learnt on
-        line, no knowledge of the spectrum), ``preview`` (the record itself, for reference only), or
-        a `mpc.forecast.forecast.Predictor` of the same sample time and horizon, which is shown what
-        the estimator knows of the hook if it has ``fused = True``, else what the unit shows.
+        line from the hook as the filter knows it), ``preview`` (the record itself, for reference
+        only), or a `mpc.forecast.forecast.Predictor` of the same sample time and horizon, which is
+        shown what the estimator knows of the hook if it has ``fused = True``, else what the unit
+        shows.
     preview
         What somebody else foretells of the hook, such as a wave radar: a predictor of the horizon
         or less, fused by its standard deviations with `predictor`, which must not be ``kalman``.
@@ -181,12 +181,9 @@ class LinearMPC(WinchMPC):
             low, high = self.window.within(
                 low, high, self._asked - winch.rest_torque, self._at_most
             )
-        # With another inertia the motor turns as the case's would under another torque.
-        over, pull = self.inertia.ratio, self.inertia.pull / self.programme.unit
-        lower, upper, rates = low, high, self._rates
-        if other := abs(over - 1.0) > _OTHER:
-            lower, upper = ((bound + (over - 1.0) * pull) / over for bound in (low, high))
-            rates = rates[0] / over, rates[1] / over
+        turns = self.inertia.turns(self.programme.unit)
+        lower, upper = turns.planned(low), turns.planned(high)
+        rates = self._rates[0] / turns.ratio, self._rates[1] / turns.ratio
         # The bounds at speeds of the last plan make a convex programme of one that is not: torque
         # times speed is limited, and the plan changes little from sample to sample.
         question = self.programme.question(gradient, free, lower, upper, rates)
@@ -200,8 +197,7 @@ class LinearMPC(WinchMPC):
             return command
         if move is None:
             move = self._otherwise(chi, reference)
-        if other:
-            move = over * move - (over - 1.0) * pull
+        move = turns.asked(move)
         # At the edge of its window the drive is asked for more than its peak, so that it holds it
         # though the speed rises over the sample; the estimator is told so at the next one.
         if leaning:

@@ -67,7 +67,6 @@ _OWNER = "predictive control"
 _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own overspeed cut
 _HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
 _PROVED = 1e-6  # residual of the optimality conditions
-_IN_BAND = 3.0  # [rad/s]
 _STALE = 1.0  # of a plan [s]
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
 _HEAVE, _RATE = HEARD.index("mru.heave"), HEARD.index("mru.heave_rate")
@@ -402,13 +401,18 @@ class WinchMPC(ABC):
         asked = self._unlimited[: winch.size] @ winch.moved @ reference
         return float(asked - self._unlimited @ chi) / self.programme.unit
 
-    def _hear(self, measurement: Measurement, time: float, applied: float) -> FloatArray:
-        """Return the estimate of a sample, (n,), and let the fallback hear it too."""
+    def _hear(
+        self, measurement: Measurement, time: float, applied: float, *, partly: bool = False
+    ) -> FloatArray:
+        """Return the estimate of a sample, (n,), and let the fallback hear it too.
+
+        Where the drive was to cut the torque for a part of it, the end tells nothing of the mean.
+        """
         self._counts["steps"] += 1
         shown = measurement.values
         left_out = self._sent - float(shown[_APPLIED])
         cut = self.window.follow(float(shown[_TORQUE]), left_out, float(shown[_SPEED]))
-        self.inertia.update(shown, cut)
+        self.inertia.update(shown, cut, partly)
         self._other = math.nan
         if self._fallback is not None:
             self._other = float(self._fallback.step(measurement, time))
@@ -466,19 +470,22 @@ def _predictor(
     if given == "bank":
         return SeaBank(case, sample_time=sample_time, horizon=horizon), "mpc"
     if given == "ar":
-        unit = case.sensors.mru
-        if unit is None:
-            return AdaptiveAR(sample_time=sample_time, horizon=horizon), "mpc-ar"
-        # An error within the band of the waves cannot be told from them.
-        error = unit.noise_floor if unit.noise_bandwidth < _IN_BAND else 0.0
-        learnt = AdaptiveAR(sample_time=sample_time, horizon=horizon, delay=unit.delay, error=error)
-        return learnt, "mpc-ar"
+        return _LearntHook(sample_time=sample_time, horizon=horizon), "mpc-ar"
     if given == "preview":
         return PerfectPreview(sample_time=sample_time, horizon=horizon), "mpc-preview"
     raise InputError(
         f"{_OWNER}: predictor must be one of bank, kalman, ar, preview or a Predictor, "
         f"got {given!r}"
     )
+
+
+class _LearntHook(AdaptiveAR):
+    """An autoregression of the hook as the filter knows it, from all sensors.
+
+    What the unit shows has its errors within the band of the waves: the load would follow them.
+    """
+
+    fused = True
 
 
 class DriveWindow:

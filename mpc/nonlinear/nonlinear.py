@@ -168,7 +168,8 @@ class NonlinearMPC(WinchMPC):
         """Return the drive command, its static part included [V, rad/s or N m]."""
         began = clock.perf_counter()
         shown, winch, shooting = measurement.values, self.model.winch, self.shooting
-        chi = self._hear(measurement, time, self._uncut(float(shown[_APPLIED])))
+        uncut, partly = self._uncut(float(shown[_APPLIED])), self._cuts[-1] is not _NONE
+        chi = self._hear(measurement, time, uncut, partly=partly)
         ahead, known = shooting.known(chi)
         self.estimator.advance(ahead)
         reference = self._reference(shown)
@@ -181,7 +182,11 @@ class NonlinearMPC(WinchMPC):
         else:  # of the estimator's own sea, at both ends of this sample
             ends = self._ends @ chi[self.model.sea_at]
         speed = self.estimator.speed
-        low, high = self.hard_bounds(speed + self._gain_of_speed(chi, ends), self._cap(shown))
+        turns = self.inertia.turns(self.programme.unit)
+        low, high = (
+            turns.planned(bound)
+            for bound in self.hard_bounds(speed + self._gain_of_speed(chi, ends), self._cap(shown))
+        )
         move: float | None = None
         # The first step is on what was prepared after the last sample; only further ones have to
         # linearise while the drive waits.
@@ -198,8 +203,11 @@ class NonlinearMPC(WinchMPC):
         else:
             if move is None:
                 move = self._otherwise(chi, reference)
-            torque = min(max(move, float(low[0])), float(high[0])) * self.programme.unit
-            command = self._given(self._command(torque, speed, chi, ends))
+            move = min(max(move, float(low[0])), float(high[0]))
+            torque = turns.asked(move) * self.programme.unit
+            # What the torque falls by over the sample goes with the speed that is planned.
+            over = self._drift(chi, move * self.programme.unit, ends)
+            command = self._given(self._command(torque, speed, over))
             self._tell(torque + winch.rest_torque)
         answered = clock.perf_counter()
         # The command is known; the rest needs no measurement, and has what is left of the time.
@@ -249,10 +257,14 @@ class NonlinearMPC(WinchMPC):
         """
         return self.window.bounds(speed, np.zeros(len(self.programme.blocks)), cap)
 
-    def _command(self, torque: float, speed: float, chi: FloatArray, ends: FloatArray) -> float:
-        """Return the drive command that gives a move [N m]."""
-        winch, drift, of = self.model.winch, self.stage.drift, self.model.constants_at.start
-        over = drift(chi[: winch.size], torque, ends, chi[of : of + 2])
+    def _drift(self, chi: FloatArray, torque: float, ends: FloatArray) -> float:
+        """Return what a move [N m] has at the start of the sample over its mean [N m]."""
+        of = self.model.constants_at.start
+        return self.stage.drift(chi[: self.model.winch.size], torque, ends, chi[of : of + 2])
+
+    def _command(self, torque: float, speed: float, over: float) -> float:
+        """Return the drive command that gives a mean torque, and so much more at first [N m]."""
+        winch = self.model.winch
         self._cuts = [_NONE, *self._cuts[:-1]]
         if over == 0.0 or not math.isfinite(over):
             return winch.command(torque, speed)
@@ -273,9 +285,8 @@ class NonlinearMPC(WinchMPC):
 
     def _gain_of_speed(self, chi: FloatArray, ends: FloatArray) -> float:
         """Return the mean motor speed of the sample over that at its start, as planned [rad/s]."""
-        winch, of = self.model.winch, self.model.constants_at.start
-        torque = self.programme.unit * float(self._moves[0])
-        over = self.stage.drift(chi[: winch.size], torque, ends, chi[of : of + 2])
+        winch = self.model.winch
+        over = self._drift(chi, self.programme.unit * float(self._moves[0]), ends)
         falls = winch.gain * winch.back
         return over / falls if falls > 0.0 and math.isfinite(over) else 0.0
 

@@ -6,7 +6,7 @@ Every measurement is taken in units of its own error, since a state of radians, 
 and sensors of any precision would leave nothing of a common scale.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 
 import numpy as np

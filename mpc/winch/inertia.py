@@ -9,6 +9,7 @@ quarter of a wave off, and constants have no covariance.
 """
 
 import math
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,15 +19,37 @@ from models.sensing import HEARD
 
 from .sampled import SampledWinch
 
+Of = TypeVar("Of", float, FloatArray)
+
 _SMOOTH = 0.5  # [s]
 _MEMORY = 120.0  # [s]
 # What is told counts as much as so many seconds at an acceleration of this share of the peak's.
 _BELIEVED, _SHARE = 10.0, 0.1
 _AT_ONCE = 1e4  # [rad/s]
 _LOW, _HIGH = 0.6, 1.6  # never beyond
+_SAME = 0.02  # of the inertia: what is less is no difference
 _TORQUE, _SPEED, _TENSION = (
     HEARD.index(name) for name in ("motor.torque", "motor.speed", "rope.tension")
 )
+
+
+class Turns(NamedTuple):
+    """How a motor of another inertia turns: as that of the case would under another torque."""
+
+    ratio: float  #: Inertia over that of the case.
+    pull: float  #: Torque with which the rope pulls, over that at rest, in the unit of the moves.
+
+    def planned(self, asked: Of) -> Of:
+        """Return the move of the case's motor that turns as this one does if so asked."""
+        if self.ratio == 1.0:
+            return asked
+        return (asked + (self.ratio - 1.0) * self.pull) / self.ratio
+
+    def asked(self, planned: Of) -> Of:
+        """Return what is to be asked of this motor, so that it turns as planned."""
+        if self.ratio == 1.0:
+            return planned
+        return self.ratio * planned - (self.ratio - 1.0) * self.pull
 
 
 class MotorInertia:
@@ -49,8 +72,13 @@ class MotorInertia:
         self._once, self._twice = (0.0, 0.0), (0.0, 0.0)
         self._sums = 0.0, 0.0, 0.0, 0.0, 0.0
 
-    def update(self, shown: FloatArray, cut: bool) -> None:
-        """Hear a sample, and whether the drive cut its torque at the end of it."""
+    def turns(self, unit: float) -> Turns:
+        """Return how the motor turns, for moves in a unit [N m]."""
+        ratio = self.ratio if abs(self.ratio - 1.0) > _SAME else 1.0
+        return Turns(ratio, self.pull / unit)
+
+    def update(self, shown: FloatArray, cut: bool, partly: bool = False) -> None:
+        """Hear a sample, and whether the drive cut its torque at the end of it, or before."""
         winch = self._winch
         speed, before = float(shown[_SPEED]), self._speed
         pull = (float(shown[_TENSION]) / winch.rest_tension - 1.0) * winch.rest_torque
@@ -63,6 +91,8 @@ class MotorInertia:
         if not math.isfinite(turns + change):
             return
         self.pull = pull
+        if partly and not cut:
+            return
         kept, new, (x, y) = self._kept, self._new, self._once
         x += new * (change / winch.sample_time - x)
         y += new * (turns / winch.data.inertia - y)

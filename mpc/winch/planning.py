@@ -8,6 +8,7 @@ lighter, or a rope stiffer, than the plan's, sixty per cent of the torque was to
 the plan put right too late went on as an oscillation of metres.  A plan that reckons with a stiffer
 rope errs to the other side, which is the harmless one.  `Unsaturated.growth` tells how far it is
 from instability; `docs/mpc.md` has the limit cycles that it ends.
+Where the drive seldom saturates the tuner chooses how stiff, as the doubts about the plant ask for.
 
 Only the plan is different.  The filter believes the case; what it finds at rest under a constant
 force is at rest for the plan too, so that nothing is left over.

@@ -34,6 +34,7 @@ structures = _module("structures")
 page = _module("structures_page")
 starts = _module("random_starts")
 figures = _module("robust_figures")
+preview = _module("preview")
 
 
 @pytest.fixture(scope="module")
@@ -189,3 +190,16 @@ def test_figures_draw_what_is_stored(make):
 
 def test_the_figure_of_structures_draws(rows):
     assert page.figure(rows).startswith(SVG)
+
+
+def test_a_longer_and_a_truer_preview_leaves_less_and_the_page_says_so():
+    stored = preview.read_rows(preview.DOCS / "data" / "preview.csv")
+    assert preview.table(stored) in (preview.DOCS / "mpc.md").read_text(encoding="utf-8")
+    left = {(row["lead"], float(row["error"])): float(row["rms"]) for row in stored}
+    for error in preview.ERRORS:
+        by_lead = [left[str(lead), error] for lead in preview.LEADS]
+        assert by_lead == sorted(by_lead, reverse=True)
+    for lead in preview.LEADS:
+        by_error = [left[str(lead), error] for error in preview.ERRORS]
+        assert by_error == sorted(by_error)
+        assert left["all", 0.0] < by_error[0] < by_error[-1] < left["0", 0.0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 from former_cases import load_case
@@ -40,3 +41,16 @@ def case_of(name: str, height: float | None = None, delay: float | None = None) 
 def controller_of(name: str, height: float | None = None, **options: object) -> LinearMPC:
     options = {"weights": WEIGHTS[name], **options}
     return LinearMPC(case_of(name, height), **options)  # type: ignore[arg-type]
+
+
+def off(case: Case, inertia: float = 1.0, torque: float = 1.0) -> Case:
+    """A case whose motor is another; a DC motor's current goes with its torque."""
+    winch = case.winch
+    return case.replace(
+        {
+            "winch.motor.inertia": inertia * winch.motor.inertia,
+            "winch.gearbox.inertia": inertia * winch.gearbox.inertia,
+            "winch.drive.torque_peak": torque * winch.drive.torque_peak,
+            "winch.drive.current_peak": torque * (winch.drive.current_peak or math.nan),
+        }
+    )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cvxpy_programme import oracle
 from former_cases import load_case
-from mpc_cases import WEIGHTS, case_of, controller_of
+from mpc_cases import WEIGHTS, case_of, controller_of, off
 from sea_predictor import SeaPredictor
 
 import models
@@ -21,6 +21,7 @@ from models.sensing import HEARD, Measurement
 from models.simulation import prepare
 from mpc.linear import WATCHED, LinearMPC, path_of_sea, sea_at_end
 from mpc.programme import SoftQP, kkt_residual
+from mpc.winch import ProcessNoise, Weights
 from mpc.winch.regulation import feedback_row
 from synth.controllers import VelocityFeedForward
 
@@ -649,19 +650,6 @@ def test_moves_stay_below_the_breakdown_torque_at_the_planned_speeds() -> None:
     assert low * unit + rest == pytest.approx(-most, rel=1e-9)
 
 
-def off(case: models.Case, inertia: float = 1.0, torque: float = 1.0) -> models.Case:
-    """A case whose motor is another; a DC motor's current goes with its torque."""
-    winch = case.winch
-    return case.replace(
-        {
-            "winch.motor.inertia": inertia * winch.motor.inertia,
-            "winch.gearbox.inertia": inertia * winch.gearbox.inertia,
-            "winch.drive.torque_peak": torque * winch.drive.torque_peak,
-            "winch.drive.current_peak": torque * (winch.drive.current_peak or math.nan),
-        }
-    )
-
-
 def test_a_torque_limit_that_is_lower_than_told_is_learnt_and_told_of():
     case, seconds = case_of("thesis-1975", 1.9), 80.0
     true = off(case, torque=0.8)
@@ -821,3 +809,14 @@ def test_a_drive_that_holds_its_peak_is_no_surprise_to_the_filter(monkeypatch):
         assert len(surprises) > 20
         rms[honest] = float(np.std(surprises))
     assert rms[True] < 0.5 * rms[False]
+
+
+@pytest.mark.ci
+def test_what_is_learnt_of_the_hook_has_not_the_units_errors():
+    """The load followed them: 53 mm on this unit of 5 cm, once the model was there."""
+    case = models.load_case("landing")
+    noise = ProcessNoise(force=0.0036, torque=0.0158, rope=0.0106, sensors=2.4e-4)
+    controller = LinearMPC(case, weights=Weights(torque=0.025, noise=noise), predictor="ar")
+    (run,) = sh.simulate(case, controller, seeds=[0], duration=140.0)
+    learnt = run["payload.displacement"][run.time > 80.0]
+    assert math.sqrt(float((learnt**2).mean())) < 0.02

@@ -8,6 +8,8 @@ import numpy.typing as npt
 import pytest
 from former_cases import load_case
 from ipopt_programme import nlp_oracle
+from mpc_cases import WEIGHTS as TOLD
+from mpc_cases import case_of, off
 from one_sample import advanced
 
 import stillhook as sh
@@ -378,3 +380,20 @@ def test_arguments_out_of_range_are_refused(thesis: sh.Case) -> None:
         NonlinearMPC(thesis, weights=WEIGHTS, slack=(1,))
     with pytest.raises(sh.InputError, match="iterations"):
         NonlinearMPC(thesis, weights=WEIGHTS, iterations=0)
+
+
+@pytest.mark.ci
+def test_an_inertia_other_than_told_is_learnt_and_planned_with() -> None:
+    case, weights = case_of("thesis-1975", 1.9), TOLD["thesis-1975"]
+    true = off(case, inertia=1.3)
+
+    def left(controller: NonlinearMPC) -> float:
+        (run,) = sh.simulate(true, controller, seeds=[1], duration=120.0, settle=60.0)
+        return run.statistics.value("payload rms")
+
+    told, learning = (NonlinearMPC(known, weights=weights) for known in (true, case))
+    # Not knowing better it leaves 452 mm.
+    assert left(learning) < 2.0 * left(told)
+    assert learning.inertia.ratio == pytest.approx(1.3, abs=0.03)
+    # Nor is what the drive cuts at the beginning of a sample taken for inertia.
+    assert told.inertia.ratio == pytest.approx(1.0, abs=0.01)

@@ -23,7 +23,7 @@ from mpc.winch import (
 from mpc.winch.regulation import feedback_row
 from mpc.winch.sampled import sampled_winch
 from mpc.winch.unsaturated import Unsaturated, _plant
-from mpc.winch.weights import OFF
+from mpc.winch.weights import plants_off
 
 #: Found by `tune_weights` for the rope at 1.25 m.
 ROPE = Weights(
@@ -45,7 +45,7 @@ def highest_growth(name: str, weights: Weights, stiffness: float, share: float) 
     loop = loop_of(name, weights, stiffness)
     return max(
         loop.growth(prediction_model(sampled_winch(case_of(name, 1.25), off=off)), share=share)
-        for off in OFF
+        for off in plants_off()
     )
 
 
@@ -65,7 +65,7 @@ def test_a_plan_on_a_stiffer_rope_is_stable_on_other_loads_and_ropes_with_half_t
 def test_on_one_spring_other_loads_and_ropes_leave_the_sensitivity_far_below_two():
     loop = loop_of("thesis-1975", WEIGHTS["thesis-1975"], STIFF)
     omega = np.geomspace(0.02, 60.0, 300)
-    for off in OFF:
+    for off in plants_off():
         plant = prediction_model(sampled_winch(case_of("thesis-1975", 1.25), off=off))
         found = np.abs(loop.sensitivity(omega, plant=plant))
         assert found.max() < 1.5
