@@ -4,7 +4,8 @@ r"""The hook foretold by whoever of a bank of seas has foretold it best: `SeaBan
 
 What the filter knows of the hook now and has known over the last forty seconds is regressed on
 what is to come.  The regression of a sea follows from its tabulated spectrum alone: with
-covariances G of what is remembered, m, with a floor on its error, and g of it with what is asked,
+covariances G of what is remembered, m, with the error that the filter holds possible, and g of it
+with what is asked,
 
 .. math::  \hat y(t + \ell) = g_\ell' G^{-1} m(t),
 
@@ -33,27 +34,30 @@ from .forecast import Forecast, leads_of
 
 _SPACING, _TAPS, _RATES = 0.2, 200, 20  # of what is remembered: [s], displacements, velocities
 _LENGTHS = (1, 4, 12, 25, 50, 100, _TAPS)  # while the record is short
-_ERROR, _RATE_ERROR = 3e-3, 10.0  # floor of theirs over the hook's rms; the velocity's over that
+# Least error of theirs, of displacement and velocity, over their rms; how much of what the filter
+# holds possible is white, and slow once it has settled: in the sea of the case either, in others.
+_LEAST, _DOUBTS, _OTHERS = (1e-3, 0.01), ((0.5, 0.1), (1.0, 0.4)), (0.5, 0.1)
 # A filter that has just begun, or whose sensors drift, is off slowly, below the waves' band: so far
 # over the hook's rms, at a density exp(-(omega t)^2 / 2) with a time t [s].
-_SLOW, _SETTLED, _SLOWNESS = 0.015, 0.0005, 6.0
+_SLOW, _SLOWNESS = 0.015, 6.0
 _SETTLING = 60.0  # [s], after which it has settled; all taps are used when it has for as long
 _PEAKS = np.geomspace(5.0, 18.0, 20)  # of seas of one system [s]
 _GAMMAS = (1.0, 3.3)
 _SWELLS, _WINDS, _SHARES = (10.0, 11.5, 13.0, 14.7, 16.5), (5.0, 5.8, 6.7, 7.8), (0.3, 0.6, 0.85)
 _JUDGED, _EVERY = (1.0, 2.0, 4.0), 0.5  # leads, and from one judgement to the next [s]
-_MEMORY, _BEGIN = 90.0, 5.0  # [s], of the errors, and before which nothing is judged
-_INDEPENDENT = 2.0  # leads, after which an error is another
+# [s], of the errors, and before which nothing is judged: the filter has begun by then.
+_MEMORY, _BEGIN = 90.0, 12.0
+_INDEPENDENT = 1.0  # leads, after which an error is another
 _LONG = 60.0  # [s], over which somebody has to have been judged who came later
 _TOLD = 0.999  # share of the sea that is told before anything is known
-_MISFIT, _FITS = 1e-6, 0.5  # share below which the sea is not as told, above which it is again
+_MISFIT, _FITS = 1e-5, 0.5  # share below which the sea is not as told, above which it is again
 _FAINT, _MOVED = 2e-3, 0.02  # share that is left out; change for which the FIR is made anew
 _NODES = np.concatenate([np.arange(0.01, 4.0, 0.01), np.arange(4.0, 60.0, 0.05)])  # [rad/s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Tables(ReadOnlyArrays):
-    """FIR of every sea: of the length of `_LENGTHS`, the first sea is that of the case."""
+    """FIR of every sea, of each length of `_LENGTHS`; the first are those of the case."""
 
     rows: tuple[FloatArray, ...]  #: Knots' displacements and velocities (m, 2k, taps).
     judged: tuple[FloatArray, ...]  #: Displacements at the leads judged (3 m, taps).
@@ -74,22 +78,31 @@ class SeaBank:
         Time between samples and between leads [s].
     horizon
         Last lead [s].
+    error
+        Standard deviations of the hook as it is known, of displacement [m] and velocity [m/s].
 
     Attributes
     ----------
     shares
-        Weight of each sea, that of the case first, the autoregression last.
+        Weight of each sea, that of the case first, at two errors, the autoregression last.
     misfit
         Whether the sea is not as told.
     """
 
     fused = True
 
-    def __init__(self, case: Case, *, sample_time: float, horizon: float) -> None:
+    def __init__(
+        self,
+        case: Case,
+        *,
+        sample_time: float,
+        horizon: float,
+        error: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
         self.leads = leads_of("sea bank", sample_time, horizon)
         self.sample_time = T = float(sample_time)
         self._step = max(1, round(_SPACING / T))
-        self._tables = _tables(case, T, self.leads.size - 1)
+        self._tables = _tables(case, T, self.leads.size - 1, error)
         knots = _knots(self.leads.size - 1, T) * T
         self._hermite, self._knots = hermite_weights(knots, self.leads), knots
         self._every, self._ahead = _judgements(T)
@@ -103,14 +116,20 @@ class SeaBank:
         to_judged = [np.array((self._ahead + k) * T) for k in range(self._step)]
         self._to_judged = [hermite_weights(own, at)[: at.size] for at in to_judged]
         members = len(self._tables.rows[0]) + 1
-        self._prior = np.full(members, math.log((1.0 - _TOLD) / (members - 1)))
-        self._prior[0] = math.log(_TOLD)
+        told = len(_DOUBTS)
+        self._prior = np.full(members, math.log((1.0 - _TOLD) / (members - told)))
+        self._prior[:told] = math.log(_TOLD / told)
         self._span = (_TAPS - 1) * self._step + 1
         #: Ages at which the next of `_LENGTHS` is remembered well enough.
         spans = [(count - 1) * self._step + 1 for count in _LENGTHS]
         self._grows = {*spans[:-1], spans[-1] + round(_SETTLING / T)}
         self._depth = int(self._ahead.max()) // self._every + 1
         self.reset()
+
+    @property
+    def fit(self) -> float:
+        """Weight of the sea that is told."""
+        return float(self.shares[: len(_DOUBTS)].sum())
 
     def reset(self) -> None:
         """Forget every earlier sample."""
@@ -181,7 +200,7 @@ class SeaBank:
                 score[self._judged[:, 0] < min(float(self._judged[0, 0]), _LONG)] = -np.inf
                 shares = np.exp(score - score.max())
                 self.shares = shares / shares.sum()
-                self.misfit = bool(self.shares[0] < (_FITS if self.misfit else _MISFIT))
+                self.misfit = bool(self.fit < (_FITS if self.misfit else _MISFIT))
                 if np.abs(self.shares - self._blended).sum() > _MOVED:
                     self._blend()
         now = self._made[turn % self._depth]
@@ -223,7 +242,7 @@ def _judgements(T: float) -> tuple[int, IndexArray]:
 
 
 @lru_cache(maxsize=8)
-def _tables(case: Case, T: float, steps: int) -> _Tables:
+def _tables(case: Case, T: float, steps: int, error: tuple[float, float]) -> _Tables:
     """Return the FIR of each sea of the bank."""
     step, knots = max(1, round(_SPACING / T)), _knots(steps, T)
     asked = np.concatenate([knots, _judgements(T)[1]])
@@ -233,6 +252,9 @@ def _tables(case: Case, T: float, steps: int) -> _Tables:
     width = np.gradient(_NODES)
     seas = _densities(case) * width
     power = float(seas[0].sum())
+    faster = float(seas[0] @ _NODES**2)
+    known = np.maximum(_LEAST, np.array(error) / np.sqrt((power, faster)))
+    doubts = [*_DOUBTS, *[_OTHERS] * (len(seas) - len(_DOUBTS))]
     seas /= seas.sum(axis=1, keepdims=True)
     off = np.exp(-0.5 * (_SLOWNESS * _NODES) ** 2) * width
     all_of = np.vstack([seas, off / off.sum()])
@@ -246,16 +268,16 @@ def _tables(case: Case, T: float, steps: int) -> _Tables:
         rates = min(count, _RATES)
         zz, vv = slice(_TAPS - count, None), slice(_TAPS - rates, None)
         rows, judged, variance = [], [], []
-        for R, Q, S in zip(r[:-1], q[:-1], s[:-1], strict=True):
-            slow = (_SETTLED if count == _TAPS else _SLOW) ** 2
+        for R, Q, S, (white, settled) in zip(r[:-1], q[:-1], s[:-1], doubts, strict=True):
+            slow = (settled * known[0] if count == _TAPS else _SLOW) ** 2
             both = (R + slow * r[-1], Q + slow * q[-1], S + slow * s[-1])
             G = np.empty((rates + count,) * 2)
             G[:rates, :rates] = both[2][np.abs(apart[vv, vv])]
             G[rates:, rates:] = both[0][np.abs(apart[zz, zz])]
             G[rates:, :rates] = (odd * both[1][np.abs(apart)])[zz, vv]
             G[:rates, rates:] = G[rates:, :rates].T
-            floor = np.full(rates + count, _ERROR**2)
-            floor[:rates] *= _RATE_ERROR**2 * S[0]
+            floor = np.full(rates + count, (white * known[0]) ** 2)
+            floor[:rates] = (white * known[1]) ** 2 * S[0]
             G.flat[:: len(G) + 1] += floor
             to_z = np.hstack([Q[ahead[:, vv]], R[ahead[:, zz]]])
             to_v = np.hstack([S[ahead[:, vv]], -Q[ahead[:, zz]]])
@@ -284,7 +306,7 @@ def _densities(case: Case) -> FloatArray:
         density = HookMotion(sea=sea, rao=told.rao, encounter=told.encounter).density(_NODES)
         return density / float(density @ np.gradient(_NODES))
 
-    found = [told.density(_NODES)]
+    found = [told.density(_NODES)] * len(_DOUBTS)
     found += [hook(peak, gamma) for gamma in _GAMMAS for peak in _PEAKS.tolist()]
     for swell in _SWELLS:
         for wind in _WINDS:

@@ -188,7 +188,10 @@ class WinchMPC(ABC):
         limits = DriveLimits.from_case(case) if limits is None else limits
         self.soft_limits = _soft_limits(self.model, limits, least, excursion)
         self._blocks = tuple(int(b) for b in blocks)
-        self.predictor, word = _predictor(case, predictor, T, self.horizon)
+        self._shows = np.ascontiguousarray(believed.hook[:, believed.sea_at])  # of the sea's state
+        known = self._shows @ believed.sea_covariance @ self._shows.T
+        z, v = np.sqrt(np.diag(known)).tolist()
+        self.predictor, word = _predictor(case, predictor, T, self.horizon, (z, v))
         self.preview = preview
         if preview is not None:
             short = len(preview.leads) <= round(self.horizon / T) + 1
@@ -205,7 +208,6 @@ class WinchMPC(ABC):
         # A path that comes from outside tells where the sea is at its end, if it is known how well
         # the estimator knows it at the start.
         self._sea_covariance = None if self.predictor is None else believed.sea_covariance
-        self._shows = np.ascontiguousarray(believed.hook[:, believed.sea_at])  # of the sea's state
         unit = case.winch.drive.torque_peak
         self.window = DriveWindow(self.model.winch, limits, len(blocks), unit)
         self.inertia = MotorInertia(winch)
@@ -453,9 +455,16 @@ def _soft_limits(
 
 
 def _predictor(
-    case: Case, given: str | Predictor, sample_time: float, horizon: float
+    case: Case,
+    given: str | Predictor,
+    sample_time: float,
+    horizon: float,
+    known: tuple[float, float],
 ) -> tuple[Predictor | None, str]:
-    """Return the predictor, None for the estimator's own sea, and the controller's name."""
+    """Return the predictor, None for the estimator's own sea, and the controller's name.
+
+    `known`: standard deviations of the hook's displacement [m] and velocity [m/s] in the estimator.
+    """
     if not isinstance(given, str):
         wanted = round(horizon / sample_time) + 1
         leads = np.asarray(given.leads)
@@ -468,7 +477,7 @@ def _predictor(
     if given == "kalman":
         return None, "mpc"
     if given == "bank":
-        return SeaBank(case, sample_time=sample_time, horizon=horizon), "mpc"
+        return SeaBank(case, sample_time=sample_time, horizon=horizon, error=known), "mpc"
     if given == "ar":
         return _LearntHook(sample_time=sample_time, horizon=horizon), "mpc-ar"
     if given == "preview":

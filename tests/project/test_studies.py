@@ -203,3 +203,17 @@ def test_a_longer_and_a_truer_preview_leaves_less_and_the_page_says_so():
         by_error = [left[str(lead), error] for error in preview.ERRORS]
         assert by_error == sorted(by_error)
         assert left["all", 0.0] < by_error[0] < by_error[-1] < left["0", 0.0]
+
+
+def test_the_tables_of_other_seas_are_those_of_their_rows():
+    seas = _module("other_seas")
+    told = seas.PAGE.read_text(encoding="utf-8")
+    rows = seas.read_rows(seas.PAGE.parent / "data" / "other_seas.csv")
+    assert seas.page(told, rows) == told
+    for sea in seas.SEAS:
+        for span in range(len(seas.SPANS)):
+            own = [seas.of(rows, sea, who, span) for who in ("bank", "hook", "feed-forward")]
+            assert all(part.size == seas.SEEDS for part in own)
+            # Worse than the load that hangs still, or than who knows nothing of what is to come?
+            assert np.all(own[0] < np.minimum(own[1], 1.2 * own[2]))
+    assert sum(row["part"] == "alarm" for row in rows) == seas.HOURS
