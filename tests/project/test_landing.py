@@ -140,9 +140,7 @@ def test_who_keeps_within_the_tolerance_is_read_from_the_rows(rows):
     still = rows_with(rows, "none", rms=1e-3, largest=2e-3)
     told = landing_page.verdict(still)
     assert "in every run: `mpc`, `nonlinear-mpc`, `none`.**" in told
-    assert (
-        "`none` is the stillest with 1.0 mm rms and at most 2 mm. Next is `nonlinear-mpc`" in told
-    )
+    assert "`none` is the stillest with 1.0 mm rms and at most 2 mm. Next is `mpc` with" in told
 
 
 def test_snaps_are_counted_above_the_load_at_rest(rows):
@@ -157,7 +155,7 @@ def test_what_the_page_says(rows, designs):
         return 1e3 * landing.mean(rows, name, "rms").mean
 
     # Who is still, in this order: predictive, both together, feedback, feed-forward.
-    assert landing_page.by_stillness(rows)[:2] == ["nonlinear-mpc", "mpc"]
+    assert landing_page.by_stillness(rows)[:2] == ["mpc", "nonlinear-mpc"]
     assert landing_page.by_stillness(rows)[2] == "combined"
     assert mm("combined") < 0.5 * mm("drum-feedback")
     assert mm("mpc-ar") > mm("feed-forward")  # less than three minutes to learn the sea
@@ -186,7 +184,7 @@ def test_what_the_page_says(rows, designs):
     # The touch-down phase: what was before, and that it stops.
     without = landing.values(rows, "mpc, touchdown none", "lifted")
     assert np.median(without) > 0.3
-    assert landing.mean(rows, "mpc, touchdown none", "slack_events").mean > 15.0
+    assert landing.mean(rows, "mpc, touchdown none", "slack_events").mean > 5.0
     assert landing_page.snaps(rows, "mpc, touchdown none") > 10  # of 20
     assert max(landing.values(rows, "mpc, touchdown none", "hardest")) > 1.0
     for name in landing_page.landers(rows):
