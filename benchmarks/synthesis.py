@@ -358,7 +358,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.seeds is not None:
         effort = Effort(seeds={**FULL.seeds, "combined": given.seeds})
     folder = docs_folder(given.quick)
-    rows = run(effort, folder)
+    found = run(effort, folder)
+    rows = [Row.of({k: str(v) for k, v in row.cells().items()}) for row in found]  # as stored
     text = f"Measured on {machine()}.\n\n{tables(rows)}"
     print(f"\n{text}")
     if not given.quick:
