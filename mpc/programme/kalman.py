@@ -116,7 +116,7 @@ class SampledFilter:
         self._outer = np.outer(scale, scale)
         self._Q, self._P0 = G @ G.T / self._outer, P / self._outer
         self._R, self._eye = R, np.eye(len(R))
-        self._start: FloatArray | None = None
+        self._start = self._P0
         self._first: list[FloatArray] = []
         self._added: dict[bytes, FloatArray] = {}
         self._steady: dict[bytes, tuple[FloatArray, FloatArray]] = {}
@@ -166,7 +166,6 @@ class SampledFilter:
         self.unheard = np.where(there, 0, self.unheard + 1)
         if self._heard < len(self._first) and not there.all():
             # What they hold of the constants would be lost on a steady gain.
-            assert self._start is not None
             self._P, self._heard = self._start, len(self._first)
         if self._heard < len(self._first):
             gain = self._first[self._heard]
@@ -216,7 +215,8 @@ class SampledFilter:
         if self._samples % _LOOKED == 0 and key in self._steady:
             steady, held = self._steady[key]
             off = gain - held
-            added = np.sum((off @ rows @ P) * (off @ rows), axis=1) + np.sum(off * off, axis=1)
+            across = off @ rows
+            added = np.sum((across @ P) * across, axis=1) + np.sum(off * off, axis=1)
             if np.all(added <= _SETTLED * np.diag(P)):
                 self._P = steady
                 self._held = np.asarray(held * self._back)
