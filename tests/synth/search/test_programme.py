@@ -35,7 +35,7 @@ from synth import (
 )
 from synth.loop import Assessment, Element, LossElement, disturbances
 from synth.question import Goal, Problem
-from synth.search import GainProgramme
+from synth.search import GainProgramme, sqp
 from synth.structures import Structure
 
 OMEGA = np.geomspace(1e-3, 1e3, 60)
@@ -218,6 +218,30 @@ def test_every_answer_is_stable_even_where_the_optimum_lies_at_the_edge() -> Non
     for start in ([-1.0, -1.0], [-10.0, -0.5], [-0.1, -3.0]):
         solved = made.solve(made.pack(start))
         assert question.stable(solved.values)
+
+
+@pytest.mark.parametrize(
+    ("limits", "goal", "guarded"),
+    [
+        ((MaxSensitivity(bound=1.7),), Goal.COST, True),
+        ((MaxSensitivity(bound=1.7),), Goal.FEASIBLE, False),
+        ((GainMargin(bound=3.0),), Goal.COST, False),
+    ],
+)
+def test_only_rows_that_keep_the_curve_off_minus_one_stand_for_poles(
+    limits, goal, guarded, monkeypatch
+) -> None:
+    told = []
+
+    def descend(*given, **options):
+        told.append(options["guarded"])
+        return sqp.descend(*given, **options)
+
+    monkeypatch.setattr("synth.search.programme.descend", descend)
+    question = problem(with_full_state(double_integrator()), StaticGain(), limits)
+    made = programme(question, [-1.0, -1.0], goal)
+    made.solve(made.pack([-1.0, -1.0]))
+    assert told == [guarded]
 
 
 def test_answer_meets_the_optimality_conditions() -> None:
