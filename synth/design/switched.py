@@ -23,11 +23,19 @@ and where the motor turns to haul, the signal jumps by the loss, s (Delta + B) t
 Both are E[x; x > 0, y > 0] = phi(0) Phi(h/q) + c phi(h) Phi(-h c/q), q^2 = 1 - c^2, of x and y of
 deviation one and correlation c, h the mean of y.  The most probable largest value in a time is the
 level that is crossed once in it.
+
+*Readings.*  A payload signal that is read every h seconds and held is a staircase: the signal,
+later by h/2, and its images about every multiple of 2 pi/h (K. J. Astrom and B. Wittenmark,
+*Computer-Controlled Systems*, 1997, section 7.2).  A density S(omega) before the readings comes
+again at 2 pi k/h +- omega, and from there acts as noise of the readings does.  Limits are without
+it.  What follows a reading has died down before the next, so that an extreme is higher over its
+deviation than that of lasting noise: it is told with the images as large as they are at their most.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -48,6 +56,8 @@ if TYPE_CHECKING:
 _SPEED, _TORQUE, _TENSION = "motor.speed", "motor.torque", "rope.tension"
 _ROUNDS = 3  # of the remnant, which is part of the speed that it goes with
 _SURE = 1.0 - 1e-9  # a correlation, at most
+_IMAGES = 12  # multiples of the rate of readings about which a staircase is looked at
+_LINES = 12  # frequencies, of equal shares of the variance, that stand for a signal that is read
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -140,6 +150,21 @@ def _density(x: npt.ArrayLike) -> FloatArray:
     return np.asarray(np.exp(-0.5 * np.square(x)) / math.sqrt(2.0 * math.pi))
 
 
+def _crest(responses: ComplexArray) -> FloatArray:
+    """Return by how much each signal's images are more than on average, where they are most, (o,).
+
+    They follow a step of the readings and have died down before the next: a Gaussian number once
+    a reading.  The responses (o, k) are to those of `_LINES` frequencies below and above each of
+    `_IMAGES` multiples of the rate.
+    """
+    below, above = np.split(responses.reshape(-1, _IMAGES, 2 * _LINES), 2, axis=-1)
+    turn = np.exp(2j * np.pi * np.outer(np.arange(1, _IMAGES + 1), np.arange(64) / 64))
+    each = np.einsum("okl,kt->olt", above, turn) + np.einsum("okl,kt->olt", below, turn).conj()
+    power = np.sum(np.abs(each) ** 2, axis=1)
+    mean = power.mean(axis=-1)
+    return np.asarray(np.sqrt(power.max(axis=-1) / np.where(mean > 0.0, mean, 1.0)))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SwitchedLoop:
     """Signals of a closed loop with its losses in them."""
@@ -189,7 +214,7 @@ class SwitchedLoop:
         return SwitchedSignal(
             nodes=nodes,
             densities=densities,
-            linear=responses[0],
+            linear=responses[0] * self._known[3][self.loop.plant.outputs.index(signal)],
             carried=carried,
             speed=responses[1],
             loss=loss,
@@ -205,20 +230,62 @@ class SwitchedLoop:
 
     def _on_nodes(self, signals: tuple[str, ...]) -> tuple[Quadrature, FloatArray, ComplexArray]:
         """Return nodes, densities (w, k) and responses (o, w, k) of signals to all that shakes."""
-        nodes, densities, responses = self._known
+        nodes, densities, responses, _ = self._known
         at = [self.loop.plant.outputs.index(one) for one in signals]
         return nodes, densities, responses[at]
 
     @cached_property
-    def _known(self) -> tuple[Quadrature, FloatArray, ComplexArray]:
-        """Nodes for all outputs of the plant, densities and responses there."""
+    def _known(self) -> tuple[Quadrature, FloatArray, ComplexArray, FloatArray]:
+        """Nodes for all outputs of the plant, densities, responses and crests (o, k) there."""
         outputs = self.loop.plant.outputs
         nodes = self.loop.quadrature(outputs)
         omega = nodes.omega
         densities = np.stack(
             [np.broadcast_to(self._density(i, omega), omega.shape) for i in range(len(self._names))]
         )
-        return nodes, densities, self.loop.responses(outputs, self._names, omega)
+        responses = self.loop.responses(outputs, self._names, omega)
+        density = np.sum(np.abs(responses) ** 2 * densities, axis=1)
+        ones = np.ones((len(outputs), omega.size))
+        found = [(omega, nodes.weights, densities, responses, ones)]
+        for name, omega, shares in self._images(nodes, dict(zip(outputs, density, strict=True))):
+            # They stand where the first of the sources does, which has nothing there.
+            from_readings = self.loop.responses(outputs, [name], omega)
+            others = len(self._names) - 1
+            found.append(
+                (
+                    omega,
+                    np.ones_like(omega),
+                    np.pad(shares[np.newaxis], ((0, others), (0, 0))),
+                    np.pad(from_readings, ((0, 0), (0, others), (0, 0))),
+                    np.broadcast_to(
+                        _crest(from_readings[:, 0])[:, np.newaxis], (len(outputs), omega.size)
+                    ),
+                )
+            )
+        omega, weights, densities, responses, crests = (
+            np.concatenate(part, axis=-1) for part in zip(*found, strict=True)
+        )
+        order = np.argsort(omega)
+        nodes = Quadrature(omega=omega[order], weights=weights[order])
+        return nodes, densities[:, order], responses[:, :, order], crests[:, order]
+
+    def _images(
+        self, nodes: Quadrature, density: Mapping[str, FloatArray]
+    ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+        """Yield noises, frequencies (k,) and variances (k,) of what signals that are held add.
+
+        The low-passes before the readings are left out, which pass the motion.
+        """
+        plant = self.loop.plant
+        for name, hold in zip(plant.measurements, plant.holds, strict=True):
+            if hold == 0.0 or name not in self.loop.controller.measurements:
+                continue
+            shares = np.cumsum(density[name] * nodes.weights * (nodes.omega < math.pi / hold))
+            each = (np.arange(_LINES) + 0.5) / _LINES * shares[-1]
+            lines = nodes.omega[np.searchsorted(shares, each)]
+            about = 2.0 * math.pi / hold * np.arange(1, _IMAGES + 1)[:, np.newaxis]
+            omega = np.concatenate([about - lines, about + lines]).ravel()
+            yield f"{name}_noise", omega, np.full(omega.size, shares[-1] / _LINES)
 
     def _density(self, index: int, omega: FloatArray) -> FloatArray:
         if self._names[index] == SET_POINT and self._remnant is not None:

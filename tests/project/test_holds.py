@@ -68,6 +68,33 @@ def test_seeds_cover_the_signs_of_a_reference_unit_and_part_structures():
     assert not set(found) & set(holds.seeds_of(coherent, coherent.case, "drum-feedback"))
 
 
+@pytest.mark.filterwarnings("ignore::models.basics.PhysicsWarning")
+def test_readings_that_are_held_shake_the_drive_as_printed():
+    """Question 229, payload velocity at 5 Hz: without noise and losses its steps are a third."""
+    exact = {f"sensors.payload.{name}_noise": 0.0 for name in ("acceleration", "velocity")}
+    exact |= {"sensors.payload.displacement_noise": 0.0, "winch.motor.coulomb_friction": 0.0}
+    lossless = {"winch.gearbox.efficiency": 1.0, "rope.sheave_efficiency": 1.0}
+    case = holds.random_case(229).replace(exact | lossless)
+    assert case.sensors.payload.velocity_rate == pytest.approx(10.0 * math.pi)
+    gains = {"A": 1.0, "a": 55.57, "a1": 142.53, "a2": 412.81}
+    gains |= {"rolloff.corner": 500.0, "rolloff.damping": 0.2}
+    design = sh.evaluate_gains(case, gains, "payload-feedback-rolloff")
+    masses = holds.fewest_masses(design)
+    assert masses < design.masses
+    runs = sh.simulate(
+        case, design, seeds=range(4), duration=1200.0, settle=holds.SETTLE, masses=masses
+    )
+    told = [run.statistics for run in runs]
+    for signal in ("payload.displacement", "motor.torque"):
+        off = holds.found_sigma(told, signal) / design.switched.deviation(signal) - 1.0
+        assert abs(off) <= SURE * holds.relative_error(design, signal, 2400.0), signal
+    torque = design.switched
+    assert torque.deviation("motor.torque") > 1.2 * design.assessment.sigma("motor.torque")
+    largest = max(one["motor.torque"].maximum for one in told)
+    rest = design.question.plant.static["motor.torque"]
+    assert 0.8 < (largest - rest) / torque.extreme("motor.torque", 2400.0) < 1.3
+
+
 def good_row():
     row = dict.fromkeys(holds.COLUMNS, "")
     row |= {"question": "7", "case": "crane", "runs": "2", "again": "0", "ok": "yes"}

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from models.basics import Quadrature
-from synth.design.switched import SwitchedSignal
+from synth.design.switched import _IMAGES, _LINES, SwitchedSignal, _crest
 
 _PEAK, _WIDE = 0.8, 0.25  # of the disturbance's density [rad/s]
 
@@ -80,3 +81,24 @@ def test_a_loss_that_turns_at_the_peaks_adds_less_than_one_that_goes_with_them()
     still = signal(loss=0.0).extreme(10_800.0)
     assert still < beside.extreme(10_800.0) < along.extreme(10_800.0)
     assert along.extreme(10_800.0) == pytest.approx(still + 0.7, rel=1e-3)
+
+
+def test_images_are_most_where_a_staircase_of_lagged_readings_jumps():
+    """Against a sine that is read every 0.2 s and held, its rate behind two lags, step by step."""
+    hold, slow, lag, count = 0.2, 0.8, 0.02, 2000
+    time = np.arange(400 * count) * hold / count
+    read = np.repeat(np.arange(400) * hold, count)
+    smooth = np.sinc(slow * hold / (2.0 * math.pi)) * np.sin(slow * (time - 0.5 * hold))
+    error = np.sin(slow * read) - smooth
+    keep = math.exp(-hold / count / lag)
+    once = lfilter([1.0 - keep], [1.0, -keep], error)
+    twice = lfilter([1.0 - keep], [1.0, -keep], once)
+    power = np.mean(((once - twice) / lag).reshape(-1, count)[10:] ** 2, axis=0)
+
+    about = 2.0 * math.pi / hold * np.arange(1, _IMAGES + 1)[:, np.newaxis]
+    lines = np.full(_LINES, slow)
+    omega = np.concatenate([about - lines, about + lines], axis=1).ravel()
+    half = 0.5 * omega * hold
+    held = np.sin(half) / half * np.exp(-1j * half)
+    (found,) = _crest((held * 1j * omega / (1.0 + 1j * omega * lag) ** 2)[np.newaxis])
+    assert found == pytest.approx(math.sqrt(power.max() / power.mean()), rel=0.03)
