@@ -46,7 +46,13 @@ if TYPE_CHECKING:
         with_sensors,
     )
     from .sensing import NOISE, SensorModel
-    from .switching import SET_POINT, SWITCHING_BAND, SwitchingNoise, SwitchingShape
+    from .switching import (
+        SET_POINT,
+        SWITCHING_BAND,
+        SWITCHING_TURN,
+        SwitchingNoise,
+        SwitchingShape,
+    )
     from .telemetry import LATE, Interval, Late, TelemetrySchedule, check_intervals
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

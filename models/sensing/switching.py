@@ -42,7 +42,7 @@ _STEP, _COUNT = 0.02, 2**16  # of the autocorrelation [s]
 #: Band that holds the variance [rad/s]: a slow drum drifts for as long as it likes.
 SWITCHING_BAND = 1e-6, math.pi / _STEP / 1.5
 _TOP = 70.0  # frequency up to which the hook's velocity counts [rad/s]
-_TURN = 1.0  # motor speed over which a loss changes sides, as in a simulation [rad/s]
+SWITCHING_TURN = 1.0  #: Motor speed over which a loss changes sides, as in a simulation [rad/s].
 _SPLITS = 32  # with which nodes made from poles alone have a peak's torque to some 3e-7
 _FAINT = 1e-12  # of the largest density, below which there is none
 _PER_DECADE, _POINTS = 16, 10  # motor speeds between which shapes are interpolated
@@ -100,7 +100,7 @@ class SwitchingShape(Generic[_Motion]):
         from scipy.interpolate import CubicSpline
 
         if speed not in self._levels:
-            kappa = speed**2 / (speed**2 + 2.0 / math.pi * _TURN**2)
+            kappa = speed**2 / (speed**2 + 2.0 / math.pi * SWITCHING_TURN**2)
             rho = kappa * self._correlation
             found = np.fft.rfft(2.0 / math.pi * (np.arcsin(rho) - rho)).real * _STEP / math.pi
             least = max(_FAINT * float(found.max()), np.finfo(float).tiny)

@@ -11,18 +11,17 @@ share of the tension's motion, as a gear loses of the load that it carries and n
 motor's own speed, where the design has that of a drum that follows the hook: a drum that hardly
 turns has a remnant that is slower and smaller.
 
-*Extreme.*  The rate at which A + s (Delta + B) crosses a level u upwards, of Gaussian A, B and
-omega (Rice 1944): with v = u - s Delta and C = A + s B, summed over s = 1 and -1,
+*Extreme.*  A loss is known but for its sign, so that it is no noise here: the loop without it hears
+the sea and the noises, which makes A, B Gaussian, and answers to -Delta s on the motor's shaft.
+That answer is told as if the motor turned with its mean period: a function Q of the phase phi of
+(omega, omega'), by the harmonics of s.  Levels are crossed by C = A + s (Delta + B) + Q at the rate
+(Rice 1944)
 
-    f_C(v) E[C'; C' > 0, s omega > 0 | C = v],
+    integral of dphi/(2 pi) R exp(-R^2/2) dR f_C(u) E[C'; C' > 0 | C = u],
 
-and where the motor turns to haul, the signal jumps by the loss, s (Delta + B) to either side:
-
-    f_omega(0) (E[omega'; omega' > 0, C_+ > v_+ | omega = 0] - E[omega'; .., C_- > v_- | ..]).
-
-Both are E[x; x > 0, y > 0] = phi(0) Phi(h/q) + c phi(h) Phi(-h c/q), q^2 = 1 - c^2, of x and y of
-deviation one and correlation c, h the mean of y.  The most probable largest value in a time is the
-level that is crossed once in it.
+all of it for omega = R sigma_omega sin(phi) and omega' = R sigma_omega' cos(phi), and s the
+simulation's tanh(omega/omega_0).  The most probable largest value in a time is the level that is
+crossed once in it.
 
 *Readings.*  A payload signal that is read every h seconds and held is a staircase: the signal,
 later by h/2, and its images about every multiple of 2 pi/h (K. J. Astrom and B. Wittenmark,
@@ -45,7 +44,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from models.basics import ComplexArray, FloatArray, Quadrature, peak_factor
-from models.sensing import SET_POINT, SwitchingNoise, SwitchingShape
+from models.sensing import SET_POINT, SWITCHING_TURN, SwitchingNoise, SwitchingShape
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -55,7 +54,13 @@ if TYPE_CHECKING:
 
 _SPEED, _TORQUE, _TENSION = "motor.speed", "motor.torque", "rope.tension"
 _ROUNDS = 3  # of the remnant, which is part of the speed that it goes with
-_SURE = 1.0 - 1e-9  # a correlation, at most
+# Phases of a motor's motion, dense where it turns, their shares of a turn, and its sizes.
+_EVENLY = 2.0 * math.pi * (np.arange(256) + 0.5) / 256
+_PHASES = _EVENLY - 0.475 * np.sin(2.0 * _EVENLY)
+_SHARES = (1.0 - 0.95 * np.cos(2.0 * _EVENLY)) / 256
+_SIZES = 0.1 * (np.arange(70) + 0.5)
+_FOLLOWS = 0.08
+_HARMONICS = 1200  # up to which a loss is followed; the even ones are zero
 _IMAGES = 12  # multiples of the rate of readings about which a staircase is looked at
 _LINES = 12  # frequencies, of equal shares of the variance, that stand for a signal that is read
 
@@ -77,7 +82,7 @@ class _Turning:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SwitchedSignal:
-    """A + s (Delta + B) of Gaussian A, B and omega, s = sign(omega), by densities on nodes."""
+    """A + s (Delta + B) + Q of Gaussian A, B and omega, by densities on nodes."""
 
     nodes: Quadrature
     densities: FloatArray  #: Of the disturbances, (w, k).
@@ -86,64 +91,93 @@ class SwitchedSignal:
     carried: ComplexArray
     speed: ComplexArray
     loss: float  #: Delta, in the signal's unit.
+    reaction: ComplexArray  #: Harmonics of Q by the phase of the speed, from 0 on; may be empty.
+    turn: float = SWITCHING_TURN  #: Speed omega_0 over which s changes its side.
 
     def extreme(self, duration: float, way: int = 1) -> float:
         """Return how far it most probably goes up (`way` 1) or down (-1) in a time [s]."""
-        moments = self._moments[way]
-        largest = 3.0 * self.loss + 9.0 * math.sqrt(moments[0, 0])
-        if self.loss == 0.0:
-            period = 2.0 * math.pi * math.sqrt(moments[0, 0] / moments[1, 1])
-            return float(peak_factor(period, duration)) * math.sqrt(moments[0, 0])
+        cov = self._covariance
+        sigma, period = math.sqrt(cov[0, 0]), 2.0 * math.pi * math.sqrt(cov[0, 0] / cov[1, 1])
+        gaussian = float(peak_factor(period, duration)) * sigma
+        if not self._switches:
+            return gaussian
 
         def excess(level: float) -> float:
             return math.log(max(self.rate(level, way) * duration, 1e-300))
 
-        # Below the level that is crossed most often it is crossed less again.
-        levels = np.linspace(0.0, largest, 200)
-        top = int(np.argmax([excess(level) for level in levels]))
-        if excess(levels[top]) <= 0.0:
-            return float(levels[top])
-        return float(brentq(excess, levels[top], largest))
+        high = gaussian + self.loss + 2.0 * float(np.abs(self._waves[0]).max())
+        while excess(high) > 0.0:
+            high *= 1.5
+        low = high
+        while excess(low) <= 0.0:
+            high, low = low, 0.9 * low
+            if low < 0.1 * gaussian:  # the loss leaves hardly a motion
+                return low
+        return float(brentq(excess, low, high, rtol=1e-9))
 
     def rate(self, level: float, way: int = 1) -> float:
         """Return how often it crosses a level upwards, or -level downwards [1/s]."""
-        total = 0.0
-        for turn in (1, -1):
-            moments, v = self._moments[turn * way], level - turn * self.loss
-            m0, m2, own, bend = (math.sqrt(one) for one in np.diag(moments))
-            r = _correlation(turn * moments[0, 2], m0 * own)
-            q = math.sqrt(1.0 - r * r)
-            crossing = moments[1, 2] / (m2 * own * q)
-            up = m2 * _rising(r * v / (m0 * q), turn * crossing)
-            total += float(_density(v / m0)) / m0 * up
-            # Jumps as the motor turns to haul, where cov(C, omega') = -cov(C', omega).
-            turning = -moments[1, 2] / (m0 * bend * q)
-            if self.loss:
-                beyond = bend * _rising(-v / (m0 * q), turning)
-                total += turn * float(_density(0.0)) / own * beyond
-        return total
+        cov = self._covariance
+        if not self._switches:
+            pace = math.sqrt(cov[1, 1] / cov[0, 0]) / (2.0 * math.pi)
+            return pace * math.exp(-0.5 * level**2 / cov[0, 0])
+        weights, mean, climb, variance, slope, rest = self._turns
+        off = level - way * mean
+        density = _density(off / np.sqrt(variance)) / np.sqrt(variance)
+        rise = (way * climb + slope * off) / rest
+        return float(np.sum(weights * density * rest * (_density(rise) + rise * ndtr(rise))))
+
+    @property
+    def _switches(self) -> bool:
+        return self.loss > 0.0 or self.reaction.size > 0
 
     @cached_property
-    def _moments(self) -> dict[int, FloatArray]:
-        """Covariances of C = A + s B, C', omega and omega', (4, 4), by s, 1 or -1."""
-        found, s = {}, 1j * self.nodes.omega
-        for way in (1, -1):
-            C = self.linear + way * self.carried
-            rows = np.stack([C, s * C, self.speed, s * self.speed])
-            weighed = rows * (self.densities * self.nodes.weights)
-            found[way] = np.asarray(np.einsum("iwk,jwk->ij", weighed.conj(), rows).real)
-        return found
+    def _covariance(self) -> FloatArray:
+        """Covariance of A, A', B, B', omega and omega', (6, 6)."""
+        s = 1j * self.nodes.omega
+        each = (self.linear, self.carried, self.speed)
+        rows = np.stack([row for one in each for row in (one, s * one)])
+        weighed = rows * (self.densities * self.nodes.weights)
+        return np.asarray(np.einsum("iwk,jwk->ij", weighed.conj(), rows).real)
 
+    @cached_property
+    def _waves(self) -> tuple[FloatArray, FloatArray]:
+        """Q and its slope over the phase, at the phases of `_turns`."""
+        harmonics = np.arange(self.reaction.size)
+        turned = np.exp(1j * np.outer(_PHASES, harmonics)) * self.reaction
+        return 2.0 * turned.real.sum(axis=1), -2.0 * (turned.imag @ harmonics)
 
-def _correlation(covariance: float, product: float) -> float:
-    return min(max(covariance / product, -_SURE), _SURE)
+    @cached_property
+    def _turns(self) -> tuple[FloatArray, ...]:
+        """By phase and size of the motor's motion (p, r): weights, and what `rate` takes.
 
-
-def _rising(mean: float, covariance: float) -> float:
-    """Return E[x; x > 0, y > 0] of Gaussian x and y of deviation one, y of a mean."""
-    c = _correlation(covariance, 1.0)
-    q = math.sqrt(1.0 - c * c)
-    return float(_density(0.0) * ndtr(mean / q) + c * _density(mean) * ndtr(-c * mean / q))
+        Mean of C and of C', the variance of C, the slope of C' over C, and the deviation of C' that
+        is left.
+        """
+        cov = self._covariance
+        own, bend = math.sqrt(cov[4, 4]), math.sqrt(cov[5, 5])
+        phase, size = _PHASES[:, np.newaxis], _SIZES[np.newaxis]
+        turning = np.stack([own * size * np.sin(phase), bend * size * np.cos(phase)])
+        s = np.tanh(turning[0] / self.turn)
+        flip = (1.0 - s**2) * turning[1] / self.turn
+        on = np.linalg.solve(cov[4:, 4:], cov[4:, :4]).T
+        left = cov[:4, :4] - on @ cov[4:, :4]
+        given = np.einsum("ij,jpr->ipr", on, turning)
+        wave, slope = (one[:, np.newaxis] for one in self._waves)
+        pace = bend / own
+        mean = given[0] + s * (given[2] + self.loss) + wave
+        climb = given[1] + s * given[3] + flip * (given[2] + self.loss) + slope * pace
+        to_C = np.stack([np.ones_like(s), np.zeros_like(s), s, np.zeros_like(s)])
+        to_slope = np.stack([np.zeros_like(s), np.ones_like(s), flip, s])
+        both = np.stack([to_C, to_slope])
+        products = np.einsum("aipr,ij,bjpr->abpr", both, left, both, optimize=True)
+        # What follows the motor's speed in full has hardly a density of its own on this grid.
+        variance = np.maximum(products[0, 0], _FOLLOWS**2 * cov[0, 0])
+        ratio = products[0, 1] / variance
+        rest = np.maximum(products[1, 1] - ratio * products[0, 1], 1e-12 * cov[1, 1])
+        step = _SIZES[1] - _SIZES[0]
+        weights = _SHARES[:, np.newaxis] * size * np.exp(-0.5 * size**2) * step
+        return weights, mean, climb, variance, ratio, np.sqrt(rest)
 
 
 def _density(x: npt.ArrayLike) -> FloatArray:
@@ -203,22 +237,48 @@ class SwitchedLoop:
         return self.signal(signal).extreme(duration, way)
 
     def signal(self, signal: str) -> SwitchedSignal:
-        """Return a signal as A + s (Delta + B)."""
-        nodes, densities, responses = self._on_nodes((signal, _SPEED, _TENSION))
+        """Return a signal as A + s (Delta + B) + Q."""
+        nodes, densities, moving, still = self._known
+        at = self.loop.plant.outputs.index
         plant, loss = self.question.plant, self.question.plant.loss.get(signal, 0.0)
-        carried = np.zeros_like(responses[2])
+        carried = np.zeros_like(still[0])
         if loss:
             dry = 0.0 if signal == _TENSION else self.question.data.coulomb_friction
             part = loss - self._share(signal) * dry
-            carried = part / plant.static[_TENSION] * responses[2]
+            carried = part / plant.static[_TENSION] * still[at(_TENSION)]
+        harmonics = self._harmonics
+        known = [name != SET_POINT or not harmonics.size for name in self._names]
         return SwitchedSignal(
             nodes=nodes,
-            densities=densities,
-            linear=responses[0] * self._known[3][self.loop.plant.outputs.index(signal)],
+            densities=densities * np.array(known)[:, np.newaxis],
+            linear=still[at(signal)],
             carried=carried,
-            speed=responses[1],
+            speed=moving[at(_SPEED)],
             loss=loss,
+            reaction=harmonics[at(signal)] if harmonics.size else harmonics,
         )
+
+    @cached_property
+    def _harmonics(self) -> ComplexArray:
+        """Harmonics of what every output makes of the losses, (o, h), of a speed like sin(phi)."""
+        noise = self.question.spectra.get(SET_POINT)
+        if not isinstance(noise, SwitchingNoise):
+            return np.zeros(0, dtype=np.complex128)
+        nodes, densities, moving, _ = self._known
+        row = np.abs(moving[self.loop.plant.outputs.index(_SPEED)]) ** 2
+        power = np.sum(row * densities, axis=0) * nodes.weights
+        speed, bend = math.sqrt(power.sum()), math.sqrt(power @ nodes.omega**2)
+        phase = 2.0 * math.pi * np.arange(4 * _HARMONICS) / (4 * _HARMONICS)
+        usual = math.sqrt(0.5 * math.pi) * speed / SWITCHING_TURN
+        loss = noise.torque * np.fft.rfft(np.tanh(usual * np.sin(phase))) / phase.size
+        odd = np.arange(1, _HARMONICS, 2)
+        omega = np.asarray(odd * (bend / speed), dtype=np.float64)
+        outputs, found = self.loop.plant.outputs, np.zeros((len(moving), _HARMONICS), np.complex128)
+        answer = self.loop.responses(outputs, [SET_POINT], omega, losses=False)[:, 0]
+        found[:, odd] = (
+            -answer * loss[odd] / self.question.data.torque_per_command(np.asarray(1j * omega))
+        )
+        return found
 
     @cached_property
     def _names(self) -> list[str]:
@@ -235,8 +295,11 @@ class SwitchedLoop:
         return nodes, densities, responses[at]
 
     @cached_property
-    def _known(self) -> tuple[Quadrature, FloatArray, ComplexArray, FloatArray]:
-        """Nodes for all outputs of the plant, densities, responses and crests (o, k) there."""
+    def _known(self) -> tuple[Quadrature, FloatArray, ComplexArray, ComplexArray]:
+        """Nodes for all outputs of the plant, and there densities and responses (o, w, k).
+
+        Responses as the loop moves, and of the loop without losses, with images at their most.
+        """
         outputs = self.loop.plant.outputs
         nodes = self.loop.quadrature(outputs)
         omega = nodes.omega
@@ -245,29 +308,22 @@ class SwitchedLoop:
         )
         responses = self.loop.responses(outputs, self._names, omega)
         density = np.sum(np.abs(responses) ** 2 * densities, axis=1)
-        ones = np.ones((len(outputs), omega.size))
-        found = [(omega, nodes.weights, densities, responses, ones)]
+        still = self.loop.responses(outputs, self._names, omega, losses=False)
+        found = [(omega, nodes.weights, densities, responses, still)]
         for name, omega, shares in self._images(nodes, dict(zip(outputs, density, strict=True))):
             # They stand where the first of the sources does, which has nothing there.
             from_readings = self.loop.responses(outputs, [name], omega)
             others = len(self._names) - 1
-            found.append(
-                (
-                    omega,
-                    np.ones_like(omega),
-                    np.pad(shares[np.newaxis], ((0, others), (0, 0))),
-                    np.pad(from_readings, ((0, 0), (0, others), (0, 0))),
-                    np.broadcast_to(
-                        _crest(from_readings[:, 0])[:, np.newaxis], (len(outputs), omega.size)
-                    ),
-                )
-            )
-        omega, weights, densities, responses, crests = (
+            heard = np.pad(from_readings, ((0, 0), (0, others), (0, 0)))
+            most = heard * _crest(from_readings[:, 0])[:, np.newaxis, np.newaxis]
+            shares = np.pad(shares[np.newaxis], ((0, others), (0, 0)))
+            found.append((omega, np.ones_like(omega), shares, heard, most))
+        omega, weights, densities, responses, still = (
             np.concatenate(part, axis=-1) for part in zip(*found, strict=True)
         )
         order = np.argsort(omega)
         nodes = Quadrature(omega=omega[order], weights=weights[order])
-        return nodes, densities[:, order], responses[:, :, order], crests[:, order]
+        return nodes, densities[:, order], responses[:, :, order], still[:, :, order]
 
     def _images(
         self, nodes: Quadrature, density: Mapping[str, FloatArray]

@@ -401,10 +401,18 @@ class Assessment:
         return np.asarray((powers @ (product * shares(nodes.omega)).T).real)
 
     def responses(
-        self, outputs: Sequence[str], sources: Sequence[str], omega: FloatArray
+        self,
+        outputs: Sequence[str],
+        sources: Sequence[str],
+        omega: FloatArray,
+        *,
+        losses: bool = True,
     ) -> ComplexArray:
-        """Return the closed-loop responses of outputs to disturbances, (z, w, k)."""
-        return self._closed(outputs, sources, omega, 0)
+        """Return the closed-loop responses of outputs to disturbances, (z, w, k).
+
+        Without the friction that losses come to, if they are left out.
+        """
+        return self._closed(outputs, sources, omega, 0 if losses else len(self._sides) - 1)
 
     def _closed(
         self,

@@ -168,6 +168,22 @@ def test_the_page_tells_the_stored_rows():
 
 
 @pytest.mark.filterwarnings("ignore::models.basics.PhysicsWarning")
+def test_what_a_design_prints_is_told_anew_beside_its_runs(tmp_path):
+    row = next(row for row in DONE if row["case"] == "random" and row["coherent"] == "no")
+    number, path = int(row["question"]), tmp_path / "holds.csv"
+    book = holds.Book(path, "new")
+    changed = {"torque.sigma": "1", "torque.up": "1", "payload.error": "1"}
+    book.keep(question(number), [row | changed | {"code": "old"}])
+    holds.print_anew(holds.Book(path, "new"), range(248))
+    (found,) = read_rows(path)
+    assert found["code"] == "new"
+    for name in ("torque.found", "torque.ups", "runs", "parameters"):
+        assert found[name] == row[name]
+    for name in changed:
+        assert float(found[name]) == pytest.approx(float(row[name]), rel=0.02)
+
+
+@pytest.mark.filterwarnings("ignore::models.basics.PhysicsWarning")
 @pytest.mark.parametrize("row", ANEW, ids=lambda row: f"{row['question']}-{row['structure']}")
 def test_what_a_row_keeps_is_kept_again(row):
     parameters = dict(part.split("=") for part in row["parameters"].split())

@@ -12,10 +12,16 @@ from models.basics import Quadrature
 from synth.design.switched import _IMAGES, _LINES, SwitchedSignal, _crest
 
 _PEAK, _WIDE = 0.8, 0.25  # of the disturbance's density [rad/s]
+_LAG = 0.5  # of the loop's answer to a loss [s]
 
 
-def signal(*, loss: float, carried: float = 0.0, phase: float = 0.6) -> SwitchedSignal:
-    """Return a signal and a speed that hear a narrow sea and a wide noise, in part the same."""
+def signal(
+    *, loss: float, carried: float = 0.0, phase: float = 0.6, answer: float = 0.0
+) -> SwitchedSignal:
+    """Return a signal and a speed that hear a narrow sea and a wide noise, in part the same.
+
+    The loop answers to the loss with so much of it, behind a lag of `_LAG`.
+    """
     x, w = np.polynomial.legendre.leggauss(200)
     omega, weights = 1.5 + 1.45 * x, 1.45 * w
     sea = np.exp(-0.5 * ((omega - _PEAK) / _WIDE) ** 2)
@@ -23,6 +29,14 @@ def signal(*, loss: float, carried: float = 0.0, phase: float = 0.6) -> Switched
     even = np.ones_like(omega)
     linear = np.stack([np.exp(1j * phase) * even, 0.8 * even])
     speed = np.stack([1j * omega, 0.2 * even])
+    odd = np.arange(1, 400, 2)
+    reaction = np.zeros(400 if answer else 0, dtype=np.complex128)
+    if answer:
+        variance, bend = (
+            (np.abs(speed) ** 2 * [sea, noise] * omega**n * weights).sum() for n in (0, 2)
+        )
+        lag = 1.0 + 1j * odd * math.sqrt(bend / variance) * _LAG
+        reaction[odd] = -answer * 2.0 / (1j * math.pi * odd) / lag
     return SwitchedSignal(
         nodes=Quadrature(omega=omega, weights=weights),
         densities=np.stack([sea, noise]),
@@ -30,11 +44,13 @@ def signal(*, loss: float, carried: float = 0.0, phase: float = 0.6) -> Switched
         carried=carried * linear * np.exp(0.3j),
         speed=speed,
         loss=loss,
+        reaction=reaction,
+        turn=1e-3,
     )
 
 
-def record(one: SwitchedSignal, *, step: float = 0.02, seed: int = 11):
-    """Return A + s (Delta + B) of a record of two million samples, a sum of random waves."""
+def record(one: SwitchedSignal, *, answer: float = 0.0, step: float = 0.02, seed: int = 11):
+    """Return A + s (Delta + B) + Q of a record of two million samples, a sum of random waves."""
     rng, count = np.random.default_rng(seed), 2**21
     omega = 2.0 * math.pi * np.fft.rfftfreq(count, step)
     inside = (omega > one.nodes.omega[0]) & (omega < one.nodes.omega[-1])
@@ -46,7 +62,8 @@ def record(one: SwitchedSignal, *, step: float = 0.02, seed: int = 11):
         for j, responses in enumerate((one.linear, one.carried, one.speed)):
             parts[j, inside] += wave * np.interp(omega[inside], one.nodes.omega, responses[i])
     A, B, speed = np.fft.irfft(parts, count) * count
-    return A + np.sign(speed) * (one.loss + B)
+    lagged = np.fft.irfft(np.fft.rfft(np.sign(speed)) / (1.0 + 1j * omega * _LAG), count)
+    return A + np.sign(speed) * (one.loss + B) - answer * lagged
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -60,6 +77,19 @@ def test_levels_are_crossed_as_often_as_in_a_drawn_record(loss, carried, phase, 
         seen = np.count_nonzero((drawn[:-1] < level) & (drawn[1:] >= level)) / duration
         error = 3.5 / math.sqrt(seen * duration) + 0.03  # crossings come in groups
         assert one.rate(level, way) == pytest.approx(seen, rel=error), (level, seen)
+
+
+@pytest.mark.parametrize("phase", [0.1, 1.5, 2.8])
+@pytest.mark.parametrize(("loss", "answer"), [(0.0, 0.8), (0.7, 0.5), (0.7, -0.6)])
+def test_what_a_loop_makes_of_a_loss_is_no_noise(loss, answer, phase):
+    one = signal(loss=loss, phase=phase, answer=answer)
+    drawn = record(one, answer=answer)
+    duration = 0.02 * drawn.size
+    for level in np.quantile(drawn, [0.9, 0.99, 0.9995]):
+        seen = np.count_nonzero((drawn[:-1] < level) & (drawn[1:] >= level)) / duration
+        # Of a period that is the mean one, where those of the drawn motion scatter.
+        error = 3.5 / math.sqrt(seen * duration) + 0.08
+        assert one.rate(level) == pytest.approx(seen, rel=error), (level, seen)
 
 
 @pytest.mark.parametrize("way", [1, -1])
