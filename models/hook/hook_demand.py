@@ -34,6 +34,8 @@ class HookDemand:
     #: Spectral moments of order 0 to 8 of the displacement (9,) [m^2 (rad/s)^n].
     moments: FloatArray
     tension: float  #: Static tension of all falls [N].
+    #: What a drive that hauls feels of it, with losses and the load's uncertain weight [N].
+    drive_tension: float = math.nan
     duration: float = THREE_HOURS  #: Exposure time [s].
     probability: float = 0.9  #: Fractile of the extremes beside the most probable one.
 
@@ -47,6 +49,7 @@ class HookDemand:
         return cls(
             moments=HookMotion.from_case(case).moments,
             tension=case.hung_weight,
+            drive_tension=case.static_torque_budget * case.winch.gearbox.ratio / case.haul_radius,
             duration=case.limits.exposure_time,
             probability=probability,
         )
@@ -77,11 +80,16 @@ class HookDemand:
         return self.tension * self.velocity.most_probable_maximum(self.duration)
 
     @property
+    def drive_power(self) -> float:
+        """What the drive has to give at that speed, losses and uncertain weight included [W]."""
+        return self.drive_tension * self.velocity.most_probable_maximum(self.duration)
+
+    @property
     def fractile_power(self) -> float:
         """Static tension times the fractile of the largest speed [W]."""
         return self.tension * self.velocity.fractile(self.probability, self.duration)
 
     @property
     def mean_power(self) -> float:
-        """Mean of the power's modulus, T sigma sqrt(2/pi): to and fro, nearly nothing net [W]."""
+        """Mean of the power's modulus, T sigma sqrt(2/pi) [W]; what is hauled is paid out again."""
         return self.tension * self.velocity.rms * math.sqrt(2.0 / math.pi)

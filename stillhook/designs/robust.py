@@ -1,7 +1,5 @@
 """Robust designs and gain schedules as figures, reports and tables of data."""
 
-import math
-
 import numpy as np
 
 from synth.robust import GainSchedule, RobustDesign
@@ -21,6 +19,7 @@ from ..text import (
     Table,
     columns,
     data_table,
+    delay_margin,
     drawn,
     headline,
     new_figure,
@@ -166,7 +165,7 @@ def _scenarios(design: RobustDesign) -> Table:
         rows.append((*row, off, *((tightest.use, tightest.name) if tightest else (None, ""))))
     heads = (
         *columns("scenario=; payload_rms=payload [m]; held=held [m]; max_sensitivity=M_s"),
-        Column("delay", write=lambda s: quantity(s, "s") if math.isfinite(s) else "any"),
+        Column("delay", write=delay_margin),
         *columns("disk; gains_off=gains off [%]; use [%]; of <"),
     )
     notes = [f"{k + 1}: {s.name}" for k, s in enumerate(design.scenarios[:_ROWS])]

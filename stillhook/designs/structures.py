@@ -24,6 +24,7 @@ from ..text import (
     Table,
     columns,
     count,
+    delay_margin,
     drawn,
     headline,
     new_figure,
@@ -126,7 +127,7 @@ def structures_table(designs: Sequence[Design], *, bound: bool = True) -> Table:
     shares = "".join(f"; {name} [%]" for name in names)
     heads = (
         *columns(f"structure; payload_rms=payload [m]; over best{shares}; max_sensitivity=M_s"),
-        Column("delay", write=lambda s: "any" if math.isinf(s) else quantity(s, "s")),
+        Column("delay", write=delay_margin),
         *columns("torque [%]; limited_by=limited by <"),
     )
     return Table(
@@ -168,7 +169,7 @@ def limited_by(design: Design) -> str:
     if binding:
         return binding
     if design.at_bounds:
-        return f"bounds of {', '.join(design.at_bounds)}"
+        return f"none; end of the search: {', '.join(design.at_bounds)}"
     if not design.shares:
         return "nothing"
     # With no limit in the way it is what disturbs most that decides.

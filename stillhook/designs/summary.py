@@ -18,6 +18,7 @@ from ..text import (
     Written,
     columns,
     decibels,
+    delay_margin,
     duration,
     largest_in,
     number,
@@ -272,7 +273,7 @@ def margin_table(design: Design) -> Table | None:
         rows.append(("phase, delay", "without bound", "|L| stays below 1"))
     else:
         rows.append(("phase", f"{number(math.degrees(margins.phase))} deg", ""))
-        rows.append(("further delay", quantity(margins.delay, "s"), ""))
+        rows.append(("further delay", delay_margin(margins.delay), ""))
     rows.append(("disk margin", number(margins.disk), "gain and phase together"))
     return remarks("", rows)
 

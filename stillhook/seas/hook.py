@@ -291,18 +291,18 @@ def _demand(survey: HookSurvey) -> list[tuple[str, str]]:
     case, own = survey.case, survey.own
     winch = case.winch
     fastest = winch.speed_limit * case.haul_radius / winch.gearbox.ratio
-    power = own.peak_power
     speed, acceleration = (
         motion.most_probable_maximum(own.duration) for motion in (own.velocity, own.acceleration)
     )
     can = f"; this winch can {quantity(fastest, 'm/s')}, {percent(speed / fastest)} used"
     limit = winch.drive.power
-    has = "" if limit is None else f"; the drive has {quantity(limit, 'W')}"
+    has = "" if limit is None else f"; it has {quantity(limit, 'W')}"
     return [
         ("to follow the hook", f"rope speed {quantity(speed, 'm/s')}{can}"),
         ("", f"acceleration {quantity(acceleration, 'm/s2')}"),
-        ("power", f"{quantity(power, 'W')} at {quantity(own.tension, 'N')}, no losses{has}"),
-        ("", f"{quantity(own.mean_power, 'W')} mean, to and fro"),
+        ("power", f"{quantity(own.peak_power, 'W')} at {quantity(own.tension, 'N')}, no losses"),
+        ("", f"{quantity(own.drive_power, 'W')} of the drive, with losses{has}"),
+        ("", f"{quantity(own.mean_power, 'W')} mean modulus"),
     ]
 
 

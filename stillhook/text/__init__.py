@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .quantities import (
         count,
         decibels,
+        delay_margin,
         duration,
         largest_in,
         listed,

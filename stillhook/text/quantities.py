@@ -29,6 +29,7 @@ _SCALES: dict[str, tuple[tuple[float, str], ...]] = {
     "rpm": ((2.0 * math.pi / 60.0, "rpm"),),  # from rad/s
 }
 _PLAIN = (1e-4, 1e7)  # sizes that are written without a power of ten
+_BEYOND_DELAYS = 60.0  # [s]
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -58,6 +59,17 @@ def scale(unit: str, size: float) -> tuple[float, str]:
         if abs(size) >= factor * (1.0 - 1e-12) and math.isfinite(size):
             return factor, name
     return choices[0 if size == 0.0 or not math.isfinite(size) else -1]
+
+
+def delay_margin(seconds: float) -> str:
+    """Return a delay margin; a dash where it is beyond all delays that a plant has, a minute.
+
+    Examples
+    --------
+    >>> delay_margin(0.0152), delay_margin(1574.0)
+    ('15.2 ms', '-')
+    """
+    return quantity(seconds, "s") if seconds < _BEYOND_DELAYS else "-"
 
 
 def quantity(value: float, unit: str, digits: int = 3, *, size: float | None = None) -> str:

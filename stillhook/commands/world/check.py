@@ -158,13 +158,14 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
 
 
 def _winch(case: Case, hook: HookMotion) -> Rows:
+    from models.hook import HookDemand
+
     winch, drive = case.winch, case.winch.drive
     torque = case.static_torque_budget
     mass = winch.inertia * (winch.gearbox.ratio / case.haul_radius) ** 2
     rope_speed = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
     fastest = hook.velocity.most_probable_maximum(case.limits.exposure_time)
     tension = case.limits.rope_tension_peak
-    power = torque * fastest * winch.gearbox.ratio / case.haul_radius
     allowed = (
         "" if tension is None else f"{percent(case.static_tension_budget / tension)} of what it may"
     )
@@ -193,8 +194,8 @@ def _winch(case: Case, hook: HookMotion) -> Rows:
         ),
         (
             "power to follow the hook",
-            quantity(power, "W"),
-            "static tension times that speed, with losses",
+            quantity(HookDemand.from_case(case).drive_power, "W"),
+            "of the drive: static tension times that speed, with losses",
         ),
     ]
 
