@@ -24,7 +24,7 @@ from ..question import GAINS, HOOK, DesignQuestion, controller_for, difference_t
 from ..search import Start
 from ..structures import structure_named
 from ..verify import Verification, verify_design
-from .switched import SwitchedLoop
+from .switched import DRAG_STEP, SwitchedLoop
 from .tuning import LimitUse, verified_members
 
 if TYPE_CHECKING:
@@ -220,7 +220,13 @@ class Design:
 
         The limits have the loss in full beside k sigma and are on the safe side of these.
         """
-        return SwitchedLoop(loop=self.assessment, question=self.question, friction=self.friction)
+        dragged = self.question.coefficients_of(DRAG_STEP * self.drag, self.friction)
+        return SwitchedLoop(
+            loop=self.assessment,
+            dragged=self.question.assess(self._known, dragged),
+            question=self.question,
+            friction=self.friction,
+        )
 
     @cached_property
     def bound(self) -> BestPossible:

@@ -23,6 +23,12 @@ all of it for omega = R sigma_omega sin(phi) and omega' = R sigma_omega' cos(phi
 simulation's tanh(omega/omega_0).  The most probable largest value in a time is the level that is
 crossed once in it.
 
+*Drag.*  A resonance that quadratic drag holds has lighter tails than a Gaussian one, since drag
+grows with the swing: of the envelope a over its sigma the density goes as a exp(-(1 - r) a^2/2 -
+r k a^3/3), k = (8/(3 pi))/sqrt(8/pi), r the drag's share of the damping (stochastic averaging;
+Roberts and Spanos 1990, ch. 8).  r of a signal is how its variance falls as the drag's coefficient
+rises, -dlog(sigma^2)/dlog(C), and A is as much smaller as its largest swing is.
+
 *Readings.*  A payload signal that is read every h seconds and held is a staircase: the signal,
 later by h/2, and its images about every multiple of 2 pi/h (K. J. Astrom and B. Wittenmark,
 *Computer-Controlled Systems*, 1997, section 7.2).  A density S(omega) before the readings comes
@@ -36,8 +42,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -60,6 +66,10 @@ _PHASES = _EVENLY - 0.475 * np.sin(2.0 * _EVENLY)
 _SHARES = (1.0 - 0.95 * np.cos(2.0 * _EVENLY)) / 256
 _SIZES = 0.1 * (np.arange(70) + 0.5)
 _FOLLOWS = 0.08
+_ANEW = 0.9  # of a variance that need not be all in what begins anew
+_LARGEST = 3.8  # sigmas of a largest swing in hours
+DRAG_STEP = 1.05  #: By which drag is multiplied, for what a signal makes of it.
+_SWING = 8.0 / (3.0 * math.pi) / math.sqrt(8.0 / math.pi)  # k of the envelope's density
 _HARMONICS = 1200  # up to which a loss is followed; the even ones are zero
 _IMAGES = 12  # multiples of the rate of readings about which a staircase is looked at
 _LINES = 12  # frequencies, of equal shares of the variance, that stand for a signal that is read
@@ -128,6 +138,12 @@ class SwitchedSignal:
         return float(np.sum(weights * density * rest * (_density(rise) + rise * ndtr(rise))))
 
     @property
+    def variance(self) -> float:
+        """The variance of the signal, in its unit squared."""
+        weights, mean, _, variance, _, _ = self._turns
+        return float(np.sum(weights * (mean**2 + variance)) / np.sum(weights))
+
+    @property
     def _switches(self) -> bool:
         return self.loss > 0.0 or self.reaction.size > 0
 
@@ -184,6 +200,24 @@ def _density(x: npt.ArrayLike) -> FloatArray:
     return np.asarray(np.exp(-0.5 * np.square(x)) / math.sqrt(2.0 * math.pi))
 
 
+def swing(share: float, gaussian: float) -> float:
+    """Return the largest swing over that of a Gaussian signal, which is so many sigmas.
+
+    `share` is that of quadratic drag in what holds the signal, 0 to 1: where the densities of both
+    envelopes are as small, over the sigma of the linear loop with the drag's equivalent.
+    """
+    if share <= 0.0:
+        return 1.0
+
+    def fallen(swing: FloatArray | float) -> Any:
+        return 0.5 * (1.0 - share) * swing**2 + share * _SWING / 3.0 * swing**3
+
+    a = np.linspace(0.0, 10.0, 1001)
+    whole = math.log(np.trapezoid(a * np.exp(-fallen(a)), a))
+    lasting = 0.5 * gaussian**2 - whole
+    return float(brentq(lambda x: fallen(x) - lasting, 0.0, 3.0 * gaussian)) / gaussian
+
+
 def _crest(responses: ComplexArray) -> FloatArray:
     """Return by how much each signal's images are more than on average, where they are most, (o,).
 
@@ -204,6 +238,7 @@ class SwitchedLoop:
     """Signals of a closed loop with its losses in them."""
 
     loop: Assessment
+    dragged: Assessment  #: The same with `DRAG_STEP` times the drag.
     question: DesignQuestion
     friction: float  #: What the losses come to as viscous friction at the motor [N m s/rad].
 
@@ -247,16 +282,48 @@ class SwitchedLoop:
             part = loss - self._share(signal) * dry
             carried = part / plant.static[_TENSION] * still[at(_TENSION)]
         harmonics = self._harmonics
-        known = [name != SET_POINT or not harmonics.size for name in self._names]
-        return SwitchedSignal(
+        made = partial(
+            SwitchedSignal,
             nodes=nodes,
-            densities=densities * np.array(known)[:, np.newaxis],
-            linear=still[at(signal)],
+            linear=still[at(signal)] * swing(self._held_by_drag[at(signal)], _LARGEST),
             carried=carried,
             speed=moving[at(_SPEED)],
             loss=loss,
             reaction=harmonics[at(signal)] if harmonics.size else harmonics,
         )
+        if not harmonics.size:
+            return made(densities=densities)
+        # A resonance that outlasts a half turn is shaken at random times: what the deviation has
+        # beyond what begins anew, and more than periods that scatter explain, is noise with the
+        # remnant's spectrum.
+        remnant = np.array([name == SET_POINT for name in self._names])[:, np.newaxis]
+        known = made(densities=densities * ~remnant)
+        shaken = nodes.integrate(
+            np.sum(np.abs(still[at(signal)]) ** 2 * densities * remnant, axis=0)
+        )
+        lacks = _ANEW * self.deviation(signal) ** 2 - known.variance
+        share = float(np.clip(lacks / shaken, 0.0, 1.0)) if shaken > 0.0 else 0.0
+        return made(densities=densities * np.where(remnant, share, 1.0))
+
+    @cached_property
+    def _held_by_drag(self) -> FloatArray:
+        """Share of quadratic drag in what holds each output, (o,), 0 to 1."""
+        outputs = self.loop.plant.outputs
+        if not any(element.lasting for element in self.loop.elements):
+            return np.zeros(len(outputs))
+        nodes = self.loop.quadrature(outputs)
+        densities = np.stack([self._density(i, nodes.omega) for i in range(len(self._names))])
+        now, then = (
+            nodes.integrate(
+                np.sum(
+                    np.abs(loop.responses(outputs, self._names, nodes.omega, losses=False)) ** 2
+                    * densities,
+                    axis=1,
+                )
+            )
+            for loop in (self.loop, self.dragged)
+        )
+        return np.asarray(np.clip(np.log(now / then) / math.log(DRAG_STEP), 0.0, 1.0))
 
     @cached_property
     def _harmonics(self) -> ComplexArray:

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from models.basics import Quadrature
-from synth.design.switched import _IMAGES, _LINES, SwitchedSignal, _crest
+from synth.design.switched import _IMAGES, _LINES, SwitchedSignal, _crest, swing
 
 _PEAK, _WIDE = 0.8, 0.25  # of the disturbance's density [rad/s]
 _LAG = 0.5  # of the loop's answer to a loss [s]
@@ -132,3 +132,23 @@ def test_images_are_most_where_a_staircase_of_lagged_readings_jumps():
     held = np.sin(half) / half * np.exp(-1j * half)
     (found,) = _crest((held * 1j * omega / (1.0 + 1j * omega * lag) ** 2)[np.newaxis])
     assert found == pytest.approx(math.sqrt(power.max() / power.mean()), rel=0.03)
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_drag_keeps_the_largest_swings_of_a_resonance_down(share):
+    """Against 600 oscillators with quadratic drag and linear damping, shaken by white noise."""
+    rng, step, count, runs = np.random.default_rng(7), 0.05, 40_000, 600
+    ratio, slope = 0.03, math.sqrt(8.0 / math.pi)
+    linear = 2.0 * ratio * np.array([[1.0 - share], [1.0]])
+    quadratic = 2.0 * ratio * np.array([[share], [0.0]]) / slope
+    kick = math.sqrt(4.0 * ratio * step)  # of white noise that leaves a deviation of one
+    x, v = rng.standard_normal((2, 2, runs))
+    largest = np.zeros((2, runs))
+    for k in range(count):
+        v += step * (-x - (linear + quadratic * np.abs(v)) * v) + kick * rng.standard_normal(runs)
+        x += step * v
+        if k * step > 100.0:
+            np.maximum(largest, np.abs(x), out=largest)
+    dragged, gaussian = largest.mean(axis=1)
+    assert dragged / gaussian == pytest.approx(swing(share, gaussian), rel=0.015)
+    assert swing(share, gaussian) < 0.96
