@@ -36,7 +36,7 @@ _LEAST_DAMPING, _MOST_DAMPING = 0.01, 3.0
 class ShapingFilter(ReadOnlyArrays):
     """x' = A x + B n, signal C x, its derivative C A x; n is white noise of intensity one."""
 
-    #: State matrices, (n, n), (n, 1), (1, n).
+    #: State matrices, (n, n), (n, m), (1, n).
     A: FloatArray
     B: FloatArray
     C: FloatArray
@@ -60,7 +60,7 @@ class ShapingFilter(ReadOnlyArrays):
         s = 1j * np.asarray(omega, dtype=np.complex128).reshape(-1)
         gain = self._resolvent.between(self.C, self.B)(s)
         assert gain is not None  # the filter is stable
-        return np.asarray((np.abs(gain) ** 2 / np.pi).reshape(np.shape(omega)))
+        return np.asarray(((np.abs(gain) ** 2).sum(axis=-1) / np.pi).reshape(np.shape(omega)))
 
     @cached_property
     def _resolvent(self) -> Resolvent:

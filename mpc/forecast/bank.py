@@ -35,11 +35,12 @@ from .forecast import Forecast, leads_of
 _SPACING, _TAPS, _RATES = 0.2, 200, 20  # of what is remembered: [s], displacements, velocities
 _LENGTHS = (1, 4, 12, 25, 50, 100, _TAPS)  # while the record is short
 # Least error of theirs, of displacement and velocity, over their rms; how much of what the filter
-# holds possible is white, and slow once it has settled: in the sea of the case either, in others.
-_LEAST, _DOUBTS, _OTHERS = (1e-3, 0.01), ((0.5, 0.1), (1.0, 0.4)), (0.5, 0.1)
-# A filter that has just begun, or whose sensors drift, is off slowly, below the waves' band: so far
-# over the hook's rms, at a density exp(-(omega t)^2 / 2) with a time t [s].
-_SLOW, _SLOWNESS = 0.015, 6.0
+# holds possible is white, and slow once it has settled; how slowly it is off before, over the
+# hook's rms: in the sea of the case either, in others.
+_LEAST, _DOUBTS, _OTHERS = (1e-3, 0.01), ((0.5, 0.1, 0.005), (1.0, 0.4, 0.015)), (0.5, 0.1, 0.005)
+# A filter that has just begun, or whose sensors drift, is off slowly, below the waves' band: at a
+# density exp(-(omega t)^2 / 2) with a time t [s].
+_SLOWNESS = 6.0
 _SETTLING = 60.0  # [s], after which it has settled; all taps are used when it has for as long
 _PEAKS = np.geomspace(5.0, 18.0, 20)  # of seas of one system [s]
 _GAMMAS = (1.0, 3.3)
@@ -268,8 +269,8 @@ def _tables(case: Case, T: float, steps: int, error: tuple[float, float]) -> _Ta
         rates = min(count, _RATES)
         zz, vv = slice(_TAPS - count, None), slice(_TAPS - rates, None)
         rows, judged, variance = [], [], []
-        for R, Q, S, (white, settled) in zip(r[:-1], q[:-1], s[:-1], doubts, strict=True):
-            slow = (settled * known[0] if count == _TAPS else _SLOW) ** 2
+        for R, Q, S, (white, settled, begun) in zip(r[:-1], q[:-1], s[:-1], doubts, strict=True):
+            slow = (settled * known[0] if count == _TAPS else begun) ** 2
             both = (R + slow * r[-1], Q + slow * q[-1], S + slow * s[-1])
             G = np.empty((rates + count,) * 2)
             G[:rates, :rates] = both[2][np.abs(apart[vv, vv])]

@@ -75,11 +75,11 @@ class LinearMPC(WinchMPC):
         that is there.
     predictor
         Where the hook's path comes from: ``bank`` (Wiener forecasts of the sea that is told and of
-        others, by the errors they make), ``kalman`` (the estimator's own sea), ``ar`` (learnt on
-        line from the hook as the filter knows it), ``preview`` (the record itself, for reference
-        only), or a `mpc.forecast.forecast.Predictor` of the same sample time and horizon, which is
-        shown what the estimator knows of the hook if it has ``fused = True``, else what the unit
-        shows.
+        others, by the errors they make), ``kalman`` (the estimator's own sea, which it holds to be
+        as told), ``ar`` (learnt on line from the hook as the filter knows it), ``preview`` (the
+        record itself, for reference only), or a `mpc.forecast.forecast.Predictor` of the same
+        sample time and horizon, which is shown what the estimator knows of the hook if it has
+        ``fused = True``, else what the unit shows.
     preview
         What somebody else foretells of the hook, such as a wave radar: a predictor of the horizon
         or less, fused by its standard deviations with `predictor`, which must not be ``kalman``.

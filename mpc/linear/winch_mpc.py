@@ -66,6 +66,7 @@ from .winch_programme import winch_programme
 _OWNER = "predictive control"
 _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own overspeed cut
 _HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
+_SWELL = 0.2  # reckoned with though not told, of the hook's variance
 _PROVED = 1e-6  # residual of the optimality conditions
 _STALE = 1.0  # of a plan [s]
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
@@ -181,7 +182,8 @@ class WinchMPC(ABC):
         self.case, self.sample_time, self.weights = case, T, weights
         # Two models: the estimator believes the case, and plans are made on a stiffer rope.
         winch = sampled_winch(case, sample_time=T, masses=masses)
-        believed = with_noise(prediction_model(winch), weights.noise)
+        other = _SWELL if predictor == "bank" else 0.0  # of another sea than is told
+        believed = with_noise(prediction_model(winch, swell=other), weights.noise)
         self.model = plan_model(believed, weights.stiffness)
         self.regulator = regulator(self.model, weights.torque)
         self.estimator = WinchEstimator(believed)

@@ -29,7 +29,7 @@ def plan_model(model: PredictionModel, stiffness: float) -> PredictionModel:
     if stiffness == 1.0:
         return model
     here = model.winch
-    other = prediction_model(here.off(axial_stiffness=stiffness))
+    other = prediction_model(here.off(axial_stiffness=stiffness), swell=model.swell)
     stiff = other.winch
     # A constant force stretches this rope by less.  Seen from where the estimator finds the drum,
     # all that is at rest is to stay there; the tension is that of the real rope, for the same sake.

@@ -7,7 +7,9 @@ The state chi holds, in this order,
 
 * the states of the winch and its rope (`mpc.winch.sampled`);
 * those of a filter whose white-noise response has the spectrum of the hook's motion
-  (`models.plant.shaping`), so that to predict the state is to predict the sea;
+  (`models.plant.shaping`), so that to predict the state is to predict the sea, and beside it,
+  where another sea is reckoned with, those of a little swell: what is slower than any wave that
+  was told would else be taken for an error of the reference unit;
 * the error of the reference unit as the case states it (`models.sensing.mru`): drift, or noise in
   the band of the waves, behind a Butterworth low-pass of second order; gain and phase error as a
   second sea, independent of the first, so many times as small; white noise is one of the
@@ -47,6 +49,7 @@ from models.basics import (
 from models.case import Case
 from models.hook import HookMotion
 from models.plant import MEASUREMENTS, ShapingFilter, fit_shaping_filter, noisy_hold, root_of
+from models.sea import SeaSpectrum
 from models.sensing import MEASURED, MruModel, SensorModel, low_pass_noise
 
 from ..programme import ages, kalman_gain, late_row, prediction_covariance, remember
@@ -58,6 +61,7 @@ CONSTANTS = ("payload.force", "motor.torque", "payload.acceleration_bias", "rope
 LATE = (*MEASUREMENTS, "mru.heave", "mru.heave_rate")
 _GRAVITY = 9.81
 _SLOW = 0.12  # frequency below which that lies, over the mean one of the hook
+_SWELLS = (10.0, 12.0, 14.5, 17.5)  # peaks of the swell that was not told [s]
 _SPARE = 2  # samples by which the telemetry may be later than the case says
 # How far the constants wander in so many seconds, over `constant_scales`: what is estimated has to
 # drift a little, or the filter would stop listening to it.
@@ -101,7 +105,8 @@ class PredictionModel(ReadOnlyArrays):
     """Matrices of the augmented state; `prediction_model` makes it."""
 
     winch: SampledWinch  #: The sampled plant.
-    sea: ShapingFilter  #: The shaping filter of the hook's motion.
+    sea: ShapingFilter  #: The shaping filter of the hook's motion, the swell's states last.
+    swell: float  #: Variance of the swell that was not told, over that of the sea that was.
     waves: tuple[float, ...]  #: Its rms displacement, velocity and acceleration [m], [m/s], [m/s2].
     #: How many states the errors of the reference unit have, those of the slow one last.
     errors: int
@@ -170,8 +175,10 @@ class PredictionModel(ReadOnlyArrays):
         return np.array(0.5 * (kept + kept.T))
 
 
-def prediction_model(winch: SampledWinch) -> PredictionModel:
+def prediction_model(winch: SampledWinch, *, swell: float = 0.0) -> PredictionModel:
     """Return the prediction model of a winch, next to certain of the world: see `with_noise`.
+
+    It reckons with a swell of which the case says nothing, of so much of the hook's variance.
 
     Raises SolverError if the hook's spectrum cannot be fitted.
     """
@@ -180,6 +187,9 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     sea = sea_filter(hook)
     sea_A, sea_Q = noisy_hold(sea.A, sea.B, T)
     error_A, error_root, error_C = _unit_error(case, hook, T, (sea_A, sea_Q, sea))
+    if swell > 0.0:
+        sea = _beside(sea, _swell_filter(hook, swell))
+        sea_A, sea_Q = noisy_hold(sea.A, sea.B, T)
     errors = error_C.shape[1]
     late = ages(winch.plant, T)[: len(LATE)]
     later = np.repeat([case.sensors.telemetry.jitter / T + _SPARE, 0.0], [len(MEASUREMENTS), 2])
@@ -224,6 +234,7 @@ def prediction_model(winch: SampledWinch) -> PredictionModel:
     model = PredictionModel(
         winch=winch,
         sea=sea,
+        swell=swell,
         waves=tuple(float(part.rms) for part in parts),
         errors=errors,
         A=A,
@@ -333,16 +344,52 @@ def sea_filter(hook: HookMotion) -> ShapingFilter:
             continue
     if not fits:
         raise SolverError(f"{_OWNER}: no filter fits the spectrum of the hook's motion")
-    best = min(fits, key=lambda fit: fit.shape_error)
-    # States of covariance one: those of a companion form differ by many powers of ten.
+    return _even(min(fits, key=lambda fit: fit.shape_error))
+
+
+def _swell_filter(hook: HookMotion, share: float) -> ShapingFilter:
+    """Return the shaping filter of long waves of any period, of so much of the hook's variance."""
+    swells = [
+        replace(
+            hook,
+            sea=SeaSpectrum(kind="jonswap", significant_height=1.0, peak_period=peak, gamma=1.0),
+        )
+        for peak in _SWELLS
+    ]
+    band = min(each.band[0] for each in swells), max(each.band[1] for each in swells)
+    sizes = [share / len(swells) * float(each.displacement.rms) ** -2 for each in swells]
+    variance = float(hook.displacement.rms) ** 2
+
+    def density(omega: FloatArray) -> FloatArray:
+        each = (size * one.density(omega) for size, one in zip(sizes, swells, strict=True))
+        return np.asarray(variance * np.sum(list(each), axis=0))
+
+    return _even(fit_shaping_filter(density, band, 4))
+
+
+def _beside(sea: ShapingFilter, other: ShapingFilter) -> ShapingFilter:
+    """Return the filter of the sum of two independent signals."""
+    return replace(
+        sea,
+        A=scipy.linalg.block_diag(sea.A, other.A),
+        B=scipy.linalg.block_diag(sea.B, other.B),
+        C=np.hstack([sea.C, other.C]),
+    )
+
+
+def _even(found: ShapingFilter) -> ShapingFilter:
+    """Return the filter with states of covariance one.
+
+    Those of a companion form differ by many powers of ten.
+    """
     root = scipy.linalg.cholesky(
-        scipy.linalg.solve_continuous_lyapunov(best.A, -best.B @ best.B.T), lower=True
+        scipy.linalg.solve_continuous_lyapunov(found.A, -found.B @ found.B.T), lower=True
     )
     return replace(
-        best,
-        A=np.linalg.solve(root, best.A @ root),
-        B=np.linalg.solve(root, best.B),
-        C=best.C @ root,
+        found,
+        A=np.linalg.solve(root, found.A @ root),
+        B=np.linalg.solve(root, found.B),
+        C=found.C @ root,
     )
 
 

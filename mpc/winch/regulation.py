@@ -22,7 +22,7 @@ def regulator(model: PredictionModel, weight: float) -> LQRegulator:
     Raises SolverError if the Riccati equation has no solution.
     """
     winch, nh = model.winch, model.sea.order
-    heave = float(np.sqrt(_stationary(model)[0, 0]))
+    heave = float(np.sqrt(_stationary(model)[0, 0] / (1.0 + model.swell)))
     rho = (weight * heave / winch.case.winch.drive.torque_peak) ** 2
     # In units of the hook's rms and the peak torque, so that the equation is well scaled.
     scale = np.maximum(np.abs(winch.moved).max(axis=1), 1e-9)

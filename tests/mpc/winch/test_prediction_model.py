@@ -130,6 +130,24 @@ def test_the_model_of_the_sea_has_the_spectrum_of_the_hook():
     assert model.sea.shape_error < 0.03
 
 
+def test_a_swell_that_was_not_told_adds_its_share_to_the_hook_and_no_error_to_the_unit():
+    winch = sampled_winch(case_of("subsea-crane"))
+    plain, model = prediction_model(winch), prediction_model(winch, swell=0.2)
+    assert model.size == plain.size + 4
+    found = []
+    for one in (plain, model):
+        at = one.sea_at
+        P = scipy.linalg.solve_discrete_lyapunov(one.A[at, at], (one.G @ one.G.T)[at, at])
+        found.append((one.hook[:, at] @ P @ one.hook[:, at].T)[0, 0])
+    assert found[1] == pytest.approx(1.2 * found[0], rel=0.02)
+    # Long waves: at 16 s there is much more than the sea as told brings.
+    more = model.sea.density(2.0 * np.pi / np.array([16.0, 6.0]))
+    own = plain.sea.density(2.0 * np.pi / np.array([16.0, 6.0]))
+    assert more[0] > 3.0 * own[0]
+    assert more[1] < 1.5 * own[1]
+    assert plan_model(model, 1.4).size == model.size
+
+
 def test_late_signals_are_linear_between_what_is_on_its_way():
     model = prediction_model(sampled_winch(case_of("subsea-crane")))
     T = model.winch.sample_time
