@@ -80,6 +80,7 @@ FORMATS: Mapping[str, Reader] = {
 _BUNDLED = {"osv-83m": "offshore support vessel, 83 m, from our own hull lines by Capytaine"}
 _HDF5 = b"\x89HDF"
 _LARGEST = 1e4  # m/m or rad/m: no vessel moves so
+_LARGEST_HEAVE = 50.0  # m/m: what a case may have; forces taken for motions are larger
 
 
 def read_raos(
@@ -135,7 +136,8 @@ def read_raos(
     Warns
     -----
     PhysicsWarning
-        If the motions in long waves are not those of a free-floating vessel, unexplained.
+        If the motions in long waves are not those of a free-floating vessel, unexplained, or the
+        table has no waves that are long.
     """
     place = _place(path)
     owner = str(path)
@@ -168,6 +170,13 @@ def read_raos(
     if largest > _LARGEST:
         raise InputError(
             f"{owner}: RAOs must be at most {_LARGEST:g} m/m or rad/m, got {largest:.3g}"
+        )
+    heave = float(np.abs(raos.mode("heave")).max())
+    if check and heave > _LARGEST_HEAVE:
+        raise InputError(
+            f"{owner}: heave must be at most {_LARGEST_HEAVE:g} m/m, got {heave:.3g} m/m: are "
+            "these forces, no motions? If it is right as it is, read it without the check "
+            "(check=False, --no-check)"
         )
     return _checked(owner, raos) if check else raos
 
@@ -258,7 +267,7 @@ def _checked(owner: str, raos: VesselRaos) -> VesselRaos:
             f"{_complex(worst.expected)} is expected; if it is right as it is, read it without the "
             "check (check=False, --no-check)"
         )
-    if found.remarks and not found.ok and found.long:
+    if found.remarks and not found.ok:
         warnings.warn(f"{owner}: {found.remarks[0]}", PhysicsWarning, stacklevel=3)
     return replace(raos, notes=(*raos.notes, *(f"check: {text}" for text in found.remarks)))
 

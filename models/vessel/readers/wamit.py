@@ -12,9 +12,13 @@ number.  WAMIT Inc., user manual 7.4, sections 3.4 and 4.9:
 * PER = 0 and PER < 0 stand for the limits of zero and infinite period: no rows of a sea.
 
 Each line says everything twice, which tells a file that was cut, shuffled or edited.
+
+The exciting forces, `.2` and `.3`, have the same lines.  They are refused by their name, by the
+name in their first line, and by a heave that is near 1 at neither end of the first column.
 """
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +30,9 @@ from ..convention import Convention, one_of
 from ..raos import VesselRaos
 
 _COLUMNS = 7
+_FORCES = {".2": "exciting forces by Haskind's relation", ".3": "exciting forces"}
+_NAMED = re.compile(r"Filename\s+(\S+)")  # in the header that NUMHDR = 1 writes
+_NEAR = 0.3  # of 1: heave at the end of a column that is that of the longest waves
 _MISMATCH = 2e-3  # of the amplitude, between its two forms on a line: six digits are printed
 
 
@@ -62,6 +69,7 @@ def parse_wamit(
     Raises InputError if a line is no line of a `.4` file or contradicts itself, rows are missing,
     or the body is not there.
     """
+    _refuse_forces(owner, text)
     rows = _rows(owner, text)
     notes = ["WAMIT .4: time factor e^{+i omega t}, z up, headings towards: as here"]
     limits = rows[:, 0] <= 0.0
@@ -78,7 +86,9 @@ def parse_wamit(
         notes.append(f"angles divided by ULEN = {length:g} m")
     kinds = {"period": "period (s)", "frequency": "frequency (rad/s)"}
     kind = (
-        _column_kind(rows) if waves is None else kinds[one_of(owner, "waves", waves, tuple(kinds))]
+        _column_kind(owner, rows)
+        if waves is None
+        else kinds[one_of(owner, "waves", waves, tuple(kinds))]
     )
     notes.append(f"first column read as {kind}" + ("" if waves else ", by the heave of long waves"))
     convention = Convention(waves=kind)
@@ -100,6 +110,19 @@ def parse_wamit(
             phase_origin=origin[:2], depth=depth, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip
+
+
+def _refuse_forces(owner: str, text: str) -> None:
+    """Raise InputError if the file's name, or the name in its first line, is one of forces."""
+    named = _NAMED.search(text.partition("\n")[0])
+    for name in (owner, named[1] if named else ""):
+        what = _FORCES.get(Path(name).suffix)
+        if what:
+            inside = "" if name == owner else f" is called {name!r} inside:"
+            raise InputError(
+                f"{owner}:{inside} WAMIT writes {what} to a {Path(name).suffix} file, in the same "
+                "columns as motions, which are in the .4 file of the same run"
+            )
 
 
 def _rows(owner: str, text: str) -> FloatArray:
@@ -160,22 +183,35 @@ def _of_body(owner: str, rows: FloatArray, body: int | None, notes: list[str]) -
         raise InputError(
             f"{owner}: body must be one of {', '.join(map(str, bodies))}, got {body!r}"
         )
-    if len(bodies) > 1:
-        notes.append(f"body {body} of {len(bodies)}: modes {6 * body - 5} to {6 * body}")
+    if bodies != [1]:
+        rest = [str(other) for other in bodies if other != body]
+        left = f"; left out: body {' and '.join(rest)}" if rest else ", the only ones in the file"
+        notes.append(f"body {body}: modes {6 * body - 5} to {6 * body}{left}")
     mine: FloatArray = rows[(modes - 1) // 6 + 1 == body].copy()
     mine[:, 2] -= 6 * (body - 1)
     return mine
 
 
-def _column_kind(rows: FloatArray) -> str:
-    """Say whether the first column is a period or a frequency: in long waves heave is 1."""
+def _column_kind(owner: str, rows: FloatArray) -> str:
+    """Say whether the first column is a period or a frequency: in long waves heave is 1.
+
+    Raises InputError if it is near 1 at neither end.
+    """
     heave = rows[rows[:, 2] == 3]
     if not heave.size:
         return "period (s)"
     amplitude = np.hypot(heave[:, 5], heave[:, 6])
     first = amplitude[heave[:, 0] == heave[:, 0].min()].mean()
     last = amplitude[heave[:, 0] == heave[:, 0].max()].mean()
-    return "frequency (rad/s)" if abs(first - 1.0) < abs(last - 1.0) else "period (s)"
+    off_first, off_last = abs(first - 1.0), abs(last - 1.0)
+    if not min(off_first, off_last) <= _NEAR:
+        raise InputError(
+            f"{owner}: heave must be near 1 in the longest waves, which are at one end of the "
+            f"first column; it is {first:.3g} and {last:.3g} there. Are these forces (WAMIT's .2 "
+            "and .3), or waves that are all short? In that case say waves=period or "
+            "waves=frequency (--waves)"
+        )
+    return "frequency (rad/s)" if off_first < off_last else "period (s)"
 
 
 def _six(

@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 from models.basics import InputError
@@ -45,7 +46,7 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, check, show and write; return 0."""
+    """Read, check, show and write; return 0, or 1 if the check ends in doubt or says nothing."""
     body = arguments.body
     with told_once():
         raos = read_raos(
@@ -67,6 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
     if table.exists() and Path(arguments.file).exists() and table.samefile(arguments.file):
         raise InputError(f"{table}: is the file itself; --out must name another")
     report = rao_report(raos, check_long_waves(raos), stem=table.stem)
+    if not arguments.check:
+        report = replace(report, ok=None)  # taken as it is, as asked
     folder.keep(write_raos(table, raos))
     folder.draw(report.drawings)
     file = shlex.quote(str(table))

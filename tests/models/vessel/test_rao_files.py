@@ -24,7 +24,7 @@ from vessel_tables import (
     wamit_text,
 )
 
-from models.basics import InputError
+from models.basics import InputError, PhysicsWarning
 from models.sea import SeaSpectrum
 from models.vessel import VesselRaos
 from models.vessel.assemble import grid
@@ -164,6 +164,43 @@ def test_wamit_takes_frequencies_a_length_limits_and_several_bodies(tmp_path: Pa
         read_raos(both)
     with pytest.raises(InputError, match="body must be one of 1, 2, got 3"):
         read_raos(both, body=3)
+
+
+def test_wamit_forces_are_no_motions(tmp_path: Path) -> None:
+    # Forces over rho g A L^n: as large as the water plane in long waves, nothing in short ones.
+    forces = wamit_text(replace(RAOS, values=RAOS.values * 63.0))
+    for suffix in (".3", ".2"):
+        with pytest.raises(InputError, match=f"WAMIT writes exciting forces.* to a {suffix} file"):
+            read_raos(put(tmp_path, f"a{suffix}", forces))
+    headed = " WAMIT Numeric Output -- Filename  ellipsoid.3    06-Dec-2016\n" + forces
+    with pytest.raises(InputError, match=r"b\.4: is called 'ellipsoid\.3' inside"):
+        read_raos(put(tmp_path, "b.4", headed))
+    bare = put(tmp_path, "c.4", forces)
+    with pytest.raises(InputError, match="heave must be near 1 in the longest waves"):
+        read_raos(bare)
+    with pytest.raises(InputError, match="heave must be at most 50 m/m, got 6"):
+        read_raos(bare, waves="period")
+    assert np.abs(read_raos(bare, waves="period", check=False).mode("heave")).max() > 50.0
+
+
+def test_wamit_of_short_waves_alone_asks_what_its_first_column_is(tmp_path: Path) -> None:
+    short = replace(RAOS, omega=RAOS.omega[5:], values=0.5 * RAOS.values[5:])
+    path = put(tmp_path, "a.4", wamit_text(short))
+    with pytest.raises(InputError, match=r"all short\? In that case say waves=period"):
+        read_raos(path)
+    with pytest.warns(PhysicsWarning, match="too short for the check"):
+        assert np.allclose(read_raos(path, waves="period").omega, short.omega)
+
+
+def test_wamit_says_which_body_is_read_and_which_is_left_out(tmp_path: Path) -> None:
+    second = re.sub(r"(?m)^(\S+ \S+) +(\d)", lambda m: f"{m[1]} {int(m[2]) + 6}", wamit_text(SHIP))
+    alone = read_raos(put(tmp_path, "a.4", second))
+    assert any("body 2: modes 7 to 12, the only ones in the file" in n for n in alone.notes)
+    both = read_raos(put(tmp_path, "b.4", wamit_text(RAOS) + second), body=1)
+    assert any("body 1: modes 1 to 6; left out: body 2" in note for note in both.notes)
+    assert not any(
+        "body" in note for note in read_raos(put(tmp_path, "c.4", wamit_text(RAOS))).notes
+    )
 
 
 def test_what_a_file_does_not_tell_can_be_told(tmp_path: Path) -> None:
@@ -397,6 +434,18 @@ def test_the_tanker_of_wamit_keeps_the_limits_of_long_waves() -> None:
     assert head[2] == pytest.approx(1.0, abs=2e-3)
     assert head[4] / k == pytest.approx(-1j, abs=6e-3)
     assert beam[3] / k == pytest.approx(-1j, abs=1e-2)
+
+
+BEM = DATA / "bemrosetta"
+needs_bem = pytest.mark.skipif(not BEM.is_dir(), reason="the real files are not here")
+
+
+@needs_bem
+def test_the_exciting_forces_of_an_ellipsoid_are_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"ellipsoid\.3: WAMIT writes exciting forces to a \.3 file"
+    ):
+        read_raos(BEM / "ellipsoid.3")
 
 
 def loads(name: str) -> VesselRaos:

@@ -66,6 +66,27 @@ def test_a_file_that_contradicts_long_waves_ends_with_two_and_one_line(
     assert "wrong sign" in said.out
 
 
+def test_doubt_and_no_check_are_told_by_the_exit_status(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    odd = replace(RAOS, values=RAOS.values * np.exp(2j * rng.normal(size=(8, 1, 6))))
+    short = replace(RAOS, omega=RAOS.omega[4:], values=RAOS.values[4:])
+    for raos, mark in ((odd, "DOUBTFUL: at"), (short, "not checked: the table begins at 0.7")):
+        file = write_raos(tmp_path / "swing.csv", raos)
+        words = ["vessel", "import", str(file), "--out", str(tmp_path / "out")]
+        assert main(words) == 1
+        said = capsys.readouterr()
+        assert mark in said.out
+        assert "warning" in said.err
+        if raos is short:
+            rows = [line for line in said.out.splitlines() if " heave " in line and " deg " in line]
+            assert rows
+            assert all(line.split()[-2:] == ["not", "long"] for line in rows)
+        assert main([*words, "--no-check"]) == 0
+        assert mark in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
