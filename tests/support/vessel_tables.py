@@ -136,8 +136,11 @@ def orcaflex_text(
     key: str = "RAOPeriodOrFrequency",
     phase_origin: str = "[~, ~, ~]",
     spread_out: bool = False,
+    units: str = "SI",
+    metres: float = 1.0,
+    depth: float | None = None,
 ) -> str:
-    """A vessel type, with the conventions asked for."""
+    """A vessel type, with the conventions asked for; lengths in a unit of so many metres."""
     words = [
         ("forward", "aft"), ("port", "starboard"), ("up", "down"),
         ("down", "up"), ("down", "up"), ("port", "starboard"),
@@ -145,9 +148,11 @@ def orcaflex_text(
     keys = ("SurgePositive", "SwayPositive", "HeavePositive", "RollPositiveStarboard",
             "PitchPositiveBow", "YawPositiveBow")  # fmt: skip
     names = ("Surge", "Sway", "Heave", "Roll", "Pitch", "Yaw")
-    x, y, z = raos.origin
+    x, y, z = (each / metres for each in raos.origin)
     lines = [
-        "%YAML 1.1", "# Type: Model", "---", "General:", "  UnitsSystem: SI", "VesselTypes:",
+        "%YAML 1.1", "# Type: Model", "---", "General:", f"  UnitsSystem: {units}",
+        *([] if depth is None else ["Environment:", f"  WaterDepth: {depth / metres!r}"]),
+        "VesselTypes:",
         "  - Name: swing", "    Length: ~", f"    RAOResponseUnits: {angles}",
         f"    RAOWaveUnit: {wave}", f"    WavesReferredToBy: {waves}",
         f"    RAOPhaseConvention: {sense}", f"    RAOPhaseUnitsConvention: {phases}",
@@ -168,7 +173,7 @@ def orcaflex_text(
                 "frequency (Hz)": omega / (2.0 * math.pi),
             }[waves]
             # Wave slope in deep water, in the unit of the angles, per metre.
-            slope = {"amplitude": 1.0, "max wave slope": omega**2 / 9.80665,
+            slope = {"amplitude": 1.0 / metres, "max wave slope": omega**2 / 9.80665,
                      "wave steepness": omega**2 / 9.80665 / math.pi}[wave]  # fmt: skip
             degrees = math.degrees(1.0) if angles == "degrees" and wave == "amplitude" else 1.0
             cells = [repr(float(first))]

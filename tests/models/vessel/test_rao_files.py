@@ -28,7 +28,7 @@ from models.basics import InputError, PhysicsWarning
 from models.sea import SeaSpectrum
 from models.vessel import VesselRaos
 from models.vessel.assemble import grid
-from models.vessel.readers import bundled_vessels, read_raos, write_raos
+from models.vessel.readers import bundled_vessels, check_long_waves, read_raos, write_raos
 from models.vessel.readers.orcaflex import parse_orcaflex
 
 RAOS = swinging()
@@ -246,6 +246,45 @@ def test_orcaflex_units_of_waves_and_angles(
         same(read_raos(put(tmp_path, "a.yml", text)), RAOS)
 
 
+@pytest.mark.parametrize(
+    ("units", "metres"),
+    [
+        ("SI", 1.0),
+        ("US", 0.3048),
+        ("User\n  LengthUnits: m\n  MassUnits: kg\n  ForceUnits: N", 1.0),
+        ("User\n  LengthUnits: ft\n  MassUnits: te", 0.3048),
+        ("User\n  LengthUnits: km", 1000.0),
+    ],
+)
+@pytest.mark.parametrize("wave", ["amplitude", "max wave slope"])
+def test_orcaflex_lengths_are_in_the_unit_of_the_file(
+    units: str, metres: float, wave: str, tmp_path: Path
+) -> None:
+    placed = replace(RAOS, origin=(4.0, -1.0, 2.0), phase_origin=(4.0, -1.0), depth=120.0)
+    text = orcaflex_text(placed, wave=wave, units=units, metres=metres, depth=120.0)
+    found = read_raos(put(tmp_path, "a.yml", text), check=False)
+    same(found, placed)
+    assert found.origin == pytest.approx((4.0, -1.0, 2.0))
+    assert found.phase_origin == pytest.approx((4.0, -1.0))
+    assert found.depth == pytest.approx(120.0)
+    assert any("converted" in note for note in found.notes) == (metres != 1.0)
+    # What a user says of the depth goes before what the file does.
+    assert read_raos(tmp_path / "a.yml", check=False, depth=70.0).depth == 70.0
+
+
+def test_orcaflex_long_waves_are_those_of_the_files_water_depth(tmp_path: Path) -> None:
+    # A right table for 12 m of water: surge and sway are twelve times what they are in deep water.
+    shallow = replace(RAOS, depth=12.0)
+    k, deep = shallow.wave_number(shallow.omega), RAOS.wave_number(RAOS.omega)
+    sweep, turn = 1.0 / np.tanh(12.0 * k)[:, None], (k / deep)[:, None]
+    ones = np.ones_like(turn)
+    scale = np.stack([sweep, sweep, ones, turn, turn, turn], axis=-1)
+    text = orcaflex_text(replace(shallow, values=RAOS.values * scale), depth=12.0)
+    check = check_long_waves(read_raos(put(tmp_path, "a.yml", text)))
+    assert check.ok
+    assert {row.verdict for row in check.rows} == {"ok"}
+
+
 @pytest.mark.parametrize("sense", ["leads", "lags"])
 @pytest.mark.parametrize(
     "relative_to", ["crest", "trough", "zero up-crossing", "zero down-crossing"]
@@ -301,7 +340,10 @@ def test_orcaflex_phase_origin_is_another_point_than_the_rao_origin(tmp_path: Pa
     [
         ("    RAOPhaseConvention: leads\n", "", "RAOPhaseConvention is missing"),
         ("RAOWaveUnit: amplitude", "RAOWaveUnit: furlong", "RAOWaveUnit must be one of amplitude"),
-        ("UnitsSystem: SI", "UnitsSystem: US", "UnitsSystem must be SI, got 'US'"),
+        ("UnitsSystem: SI", "UnitsSystem: CGS", "UnitsSystem must be one of SI, US, User"),
+        ("UnitsSystem: SI", "UnitsSystem: User", "LengthUnits is missing"),
+        ("UnitsSystem: SI", "UnitsSystem: User\n  LengthUnits: kg", "such as m, km, ft; got 'kg'"),
+        ("General:", "Environment:\n  WaterDepth: deep\nGeneral:", "WaterDepth must be .* 'deep'"),
         ("VesselTypes:", "VesselKinds:", "no list of VesselTypes"),
         ("DisplacementRAOs:", "OtherRAOs:", "it may have load RAOs only"),
         ("RAODirection: 30", "RAODirection: north", "RAODirection must be a finite number"),
@@ -446,6 +488,23 @@ def test_the_exciting_forces_of_an_ellipsoid_are_refused() -> None:
         InputError, match=r"ellipsoid\.3: WAMIT writes exciting forces to a \.3 file"
     ):
         read_raos(BEM / "ellipsoid.3")
+
+
+@needs_bem
+def test_an_orcaflex_vessel_in_units_of_the_users_own_is_the_one_in_si() -> None:
+    with pytest.warns(PhysicsWarning, match="no usual mistake"):  # odd in both
+        si, own = (read_raos(BEM / f"RunB_{name}.yml") for name in ("SI", "m_kg_kN"))
+    assert np.allclose(si.values, own.values, rtol=1e-6, atol=1e-9)
+    assert (si.depth, own.depth) == (1000.0, 1000.0)
+
+
+@needs_bem
+def test_an_orcaflex_file_tells_its_water_depth() -> None:
+    raos = read_raos(BEM / "Orca.flex.yml")
+    assert raos.depth == 100.0
+    check = check_long_waves(raos)
+    assert check.ok
+    assert {row.verdict for row in check.rows} == {"ok"}
 
 
 def loads(name: str) -> VesselRaos:
