@@ -165,6 +165,9 @@ def _failed(error: Exception) -> int:
     if isinstance(error, InputError):
         print(error, file=sys.stderr)
         return BAD_INPUT
+    if isinstance(error, OSError) and error.filename is not None:  # a place that was named
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        return BAD_INPUT
     hint = "run the command again with --debug to see where"
     if isinstance(error, StillhookError):
         print(f"stillhook: the computation failed: {error}; {hint}", file=sys.stderr)

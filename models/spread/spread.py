@@ -26,10 +26,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range, read_text
+from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..casefile import Path as Place
-from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
+from ..casefile import case_text, line_of, message_line, read_yaml, suggestion, yaml_text
 from ..operation import PREFIX as FAULTS
 from .distributions import KINDS, Distribution, Samples, Uniform, at_ends
 from .fields import ALIASES, DRAG, GAINS, Field, field_of, resolved
@@ -139,7 +139,7 @@ class Spread:
 
         Raises InputError if there is no such file or it is no spread; file and line are named.
         """
-        data, lines = read_yaml(read_text(path), str(path))
+        data, lines = read_yaml(case_text(path), str(path))
         return cls.from_dict(data, source=str(path), lines=lines)
 
     @property

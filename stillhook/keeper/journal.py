@@ -20,12 +20,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from models.basics import InputError
+from models.basics import InputError, check_file
 
 FORMAT = 2  #: Version of what stands in a line.
 
 _BEGIN = b'{"crc": '
 _LINE = re.compile(rb'\{"crc": (\d+), "of": (\{.*\})\}\n')
+_LARGEST = 20_000_000_000  # bytes
 _SYNC = 1.0  # a power failure may cost as much of the work [s]; a killed process costs none
 _TOLD = "python"  # is told in the question, and may differ
 
@@ -46,6 +47,8 @@ class Journal:
     def __init__(self, path: Path, what: str, question: Mapping[str, Any], take: Take) -> None:
         self.path, self._what = path, what
         try:
+            if path.exists():
+                check_file(path, _LARGEST)
             self._file: BinaryIO = open(path, "a+b")  # noqa: SIM115
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from error
@@ -148,6 +151,8 @@ def question_in(path: Path, what: str) -> dict[str, Any]:
     Raises InputError if there is no journal, or it is none of this version's.
     """
     try:
+        if path.exists():
+            check_file(path, _LARGEST)
         with open(path, "rb") as file:
             line = file.readline()
     except OSError:
@@ -181,7 +186,10 @@ def _content(line: bytes) -> dict[str, Any] | None:
     match = _LINE.fullmatch(line)
     if match is None or zlib.crc32(match[2]) != int(match[1]):
         return None
-    content: dict[str, Any] = json.loads(match[2])
+    try:
+        content: dict[str, Any] = json.loads(match[2])
+    except (ValueError, RecursionError):  # a good check sum, but no text of ours
+        return None
     return content
 
 

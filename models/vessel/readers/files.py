@@ -8,6 +8,7 @@ is still one.  Whatever a reader trips over comes out as an
 and is caught here, once for all of them.
 """
 
+import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from ...basics import (
     InputError,
     PhysicsWarning,
     StillhookError,
+    binary_name,
     check_finite,
     check_hdf5,
     read_bytes,
@@ -212,10 +214,10 @@ def file_format_of(owner: str, data: bytes) -> str:
     if head.startswith(b"MATLAB"):
         return "mss"
     known = ", ".join(FORMATS)
-    if b"\x00" in data:
-        raise InputError(
-            f"{owner}: this is a binary file of no kind that is known here (formats: {known})"
-        )
+    name = binary_name(data)
+    if name or b"\x00" in data:
+        what = name or "a binary file of no kind that is known here"
+        raise InputError(f"{owner}: this is no RAO file, but {what} (formats: {known})")
     text = text_of(owner, data)
     # From the most to the least telling: a WAMIT file is bare numbers, as others' tables are.
     looks = {
@@ -282,7 +284,7 @@ def _complex(value: complex) -> str:
 def _place(path: str | Path) -> Path:
     """Return the file of a path, or of the name of a bundled vessel."""
     name, place = str(path), Path(path)
-    there = "\x00" in name or bool(place.suffix) or place.exists()
+    there = "\x00" in name or bool(place.suffix) or os.path.exists(place)
     if name in _BUNDLED and not there:
         return Path(str(resources("models.vessel"))) / "data" / f"{name}.csv"
     if not there:

@@ -362,7 +362,9 @@ def test_an_orcaflex_file_that_is_wrong_is_answered_by_key(
 def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
     for name, content, words in (
         ("a.yml", "name: subsea-crane\nsea: {}\n", "no RAO file of a kind that is known"),
-        ("a.bin", bytes(range(256)) * 4, "a binary file of no kind"),
+        ("a.bin", bytes(range(256)) * 4, "no RAO file, but a binary file of no kind"),
+        ("a.csv", b"PK\x03\x04\x14\x00xl/workbook.xml\x00", "no RAO file, but an Excel workbook"),
+        ("a.4", b"\x89PNG\r\n\x1a\n\x00", r"no RAO file, but a picture \(PNG\)"),
         ("a.txt", "   \n", "the file is empty"),
         ("a.re8", shipx_text({0.0: RAOS}).replace("MOTION", "FORCE"), "holds forces"),
         ("a.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "version 7.3 are not read"),
@@ -382,6 +384,10 @@ def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
         read_raos(tmp_path / "a.4", ulen=80.0)
     with pytest.raises(InputError, match="is a folder"):
         read_raos(tmp_path)
+    with pytest.raises(InputError, match="no bundled vessel of this name"):
+        read_raos("a" * 300)
+    with pytest.raises(InputError, match="no text, as was expected, but an Excel workbook"):
+        read_raos(tmp_path / "a.csv", file_format="wamit")
 
 
 @pytest.mark.parametrize("kind", ["wamit", "shipx", "orcaflex"])
