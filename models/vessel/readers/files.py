@@ -33,14 +33,16 @@ from ..assemble import finished, text_of
 from ..convention import one_of
 from ..raos import VesselRaos
 from ..symmetry import SYMMETRIES
+from .aqwa import looks_like_aqwa, parse_aqwa
 from .capytaine_file import parse_capytaine
 from .csv_file import csv_text, looks_like_csv, parse_csv
 from .long_waves import check_long_waves
 from .mss import parse_mss
 from .netcdf_file import is_ours, parse_netcdf, write_netcdf
-from .orcaflex import looks_like_orcaflex, parse_orcaflex
+from .orcaflex import looks_like_orcaflex, orcaflex_text, parse_orcaflex
 from .shipx import looks_like_shipx, parse_shipx
-from .wamit import looks_like_wamit, parse_wamit
+from .wamit import looks_like_wamit, parse_wamit, wamit_text
+from .wamit_listing import looks_like_wamit_listing, parse_wamit_listing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,8 +78,18 @@ FORMATS: Mapping[str, Reader] = {
         text=False,
     ),
     "shipx": Reader(about="ShipX/Veres .re1", parse=parse_shipx),
+    "aqwa": Reader(about="listing of AQWA (.LIS)", parse=parse_aqwa),
+    "wamit-listing": Reader(about="listing of WAMIT (.out)", parse=parse_wamit_listing),
 }
 """The formats that are read."""
+
+_TEXTS: Mapping[str, Callable[[VesselRaos], str]] = {
+    ".csv": csv_text,
+    ".4": wamit_text,
+    ".yml": orcaflex_text,
+}
+ENDINGS = (*_TEXTS, ".nc")
+"""Endings of the files that are written."""
 
 _BUNDLED = {"osv-83m": "offshore support vessel, 83 m, from our own hull lines by Capytaine"}
 _HDF5 = b"\x89HDF"
@@ -111,7 +123,7 @@ def read_raos(
 
         - speed: which forward speed of the file [m/s], the lowest if left out (MSS, ShipX,
           Capytaine).
-        - body: which body of the file (WAMIT: a number from 1; Capytaine: a name).
+        - body: which body of the file (WAMIT, AQWA: a number from 1; Capytaine: a name).
         - length: WAMIT's ULEN [m], 1 m if left out.
         - depth: water depth [m], where the file does not tell (WAMIT, OrcaFlex) or has several
           (Capytaine).
@@ -184,16 +196,21 @@ def read_raos(
 
 
 def write_raos(path: str | Path, raos: VesselRaos) -> Path:
-    """Write a table as the project's CSV (.csv) or NetCDF (.nc); both read back exactly.
+    """Write a table as the project's CSV (.csv) or NetCDF (.nc), for WAMIT (.4) or OrcaFlex (.yml).
 
-    Raises InputError if the name ends otherwise, or the file cannot be written.
+    The project's own read back exactly, the others to twelve digits and without notes; a WAMIT file
+    has no place for origin and water depth.
+
+    Raises InputError if the name ends otherwise, the file cannot be written, or the vessel moves
+    forward and the format has no speed.
     """
     place = Path(path)
-    if place.suffix.lower() == ".csv":
-        return write_text_atomically(place, csv_text(raos))
-    if place.suffix.lower() == ".nc":
+    ending = place.suffix.lower()
+    if ending == ".nc":
         return write_netcdf(place, raos)
-    raise InputError(f"{place}: the name of a RAO file must end in .csv or .nc")
+    if ending not in _TEXTS:
+        raise InputError(f"{place}: the name of a RAO file must end in {', '.join(ENDINGS)}")
+    return write_text_atomically(place, _TEXTS[ending](raos))
 
 
 def bundled_vessels() -> tuple[tuple[str, str], ...]:
@@ -221,6 +238,8 @@ def file_format_of(owner: str, data: bytes) -> str:
     text = text_of(owner, data)
     # From the most to the least telling: a WAMIT file is bare numbers, as others' tables are.
     looks = {
+        "aqwa": looks_like_aqwa,
+        "wamit-listing": looks_like_wamit_listing,
         "orcaflex": looks_like_orcaflex,
         "csv": looks_like_csv,
         "shipx": looks_like_shipx,

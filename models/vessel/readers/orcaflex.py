@@ -15,6 +15,8 @@ water depth are lengths.  `UnitsSystem` SI has metres, US feet, User what `Lengt
 Older versions write `RAOPeriodOrFreq` where newer ones write `RAOPeriodOrFrequency`.
 """
 
+import cmath
+import json
 import math
 import re
 from typing import Any
@@ -32,8 +34,9 @@ from ...basics import (
 )
 from ..assemble import finished, grid
 from ..convention import Convention, one_of
-from ..raos import VesselRaos
+from ..raos import MODES, VesselRaos
 from ..symmetry import SYMMETRIES
+from .wamit import at_rest
 
 Entry = dict[str, Any]
 
@@ -103,6 +106,43 @@ def parse_orcaflex(
         phase_origin=zero[:2], depth=depth, source=owner, notes=tuple(notes),
     )  # fmt: skip
     return finished(raos, symmetry=symmetry)
+
+
+def orcaflex_text(raos: VesselRaos) -> str:
+    """Return a table as an OrcaFlex text file with one vessel type, in SI units.
+
+    Raises InputError if the vessel moves forward.
+    """
+    found = at_rest(raos, "an OrcaFlex file")
+    name, own = json.dumps(raos.name), Convention()
+    origin = ", ".join(repr(each) for each in raos.origin)
+    zero = ", ".join(repr(each) for each in (*raos.phase_origin, raos.origin[2]))
+    depth = [] if math.isinf(raos.depth) else ["Environment:", f"  WaterDepth: {raos.depth!r}"]
+    lines = [
+        "%YAML 1.1", "---", "General:", "  UnitsSystem: SI", *depth, "VesselTypes:",
+        f"  - Name: {name}", "    RAOResponseUnits: radians", "    RAOWaveUnit: amplitude",
+        f"    WavesReferredToBy: {own.waves}", f"    RAOPhaseConvention: {own.phase}",
+        f"    RAOPhaseUnitsConvention: {own.phase_unit}",
+        f"    RAOPhaseRelativeToConvention: {own.phase_relative_to}",
+        f"    SurgePositive: {own.surge}", f"    SwayPositive: {own.sway}",
+        f"    HeavePositive: {own.heave}",
+        f"    RollPositiveStarboard: {own.roll.rpartition(' ')[2]}",
+        f"    PitchPositiveBow: {own.pitch.rpartition(' ')[2]}",
+        f"    YawPositiveBow: {own.yaw.rpartition(' ')[2]}", "    Symmetry: None",
+        "    Draughts:", "      - Name: Draught1", f"        {_SECTION}:",
+        f"          RAOOrigin: [{origin}]", f"          PhaseOrigin: [{zero}]", "          RAOs:",
+    ]  # fmt: skip
+    parts = (f"RAO{mode.capitalize()}{part}" for mode in MODES for part in ("Amp", "Phase"))
+    head = ", ".join([_TABLE_KEYS[0], *parts])
+    for j, degrees in enumerate(found.heading_deg):
+        lines += [f"            - RAODirection: {float(degrees)!r}", f"              {head}:"]
+        for i, omega in enumerate(found.omega):
+            cells = [float(omega)]
+            for value in found.values[i, j]:
+                cells += [abs(value), math.degrees(cmath.phase(value))]
+            row = ", ".join(repr(float(cell)) for cell in cells)
+            lines.append(f"                - [{row}]")
+    return "\n".join(lines) + "\n"
 
 
 def _told(text: str, key: str) -> str | None:

@@ -17,6 +17,7 @@ The exciting forces, `.2` and `.3`, have the same lines.  They are refused by th
 name in their first line, and by a heave that is near 1 at neither end of the first column.
 """
 
+import cmath
 import math
 import re
 from pathlib import Path
@@ -78,7 +79,7 @@ def parse_wamit(
         rows = rows[~limits]
     if not rows.size:
         raise InputError(f"{owner}: there is no row of a finite period above 0 s in this file")
-    rows = _of_body(owner, rows, body, notes)
+    rows = of_body(owner, rows, body, notes)
     scale = 1.0 if length is None else check_range(owner, "length", length, low=0.0, open_low=True)
     if length is None:
         notes.append("angles read as rad/m: ULEN taken as 1 m (length=.. if the run had another)")
@@ -101,7 +102,9 @@ def parse_wamit(
             f"{owner}: the first column must be in (1e-6, 1e6) s or rad/s, got {first:g} to "
             f"{last:g}"
         )
-    omega, heading, table = _six(owner, convention.omega(rows[:, 0]), rows[:, 1], modes, scaled)
+    omega, heading, table = six_modes(
+        owner, convention.omega(rows[:, 0]), rows[:, 1], modes, scaled
+    )
     motions = convention.complex_values(table, wave_number(omega, depth))
     w, b, found = grid(owner, omega, convention.directions(heading), motions)
     return finished(
@@ -110,6 +113,36 @@ def parse_wamit(
             phase_origin=origin[:2], depth=depth, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip
+
+
+def wamit_text(raos: VesselRaos) -> str:
+    """Return a table as the text of a `.4` file of periods, ULEN 1 m.
+
+    The file has no place for origin, water depth and forward speed: who reads it tells the former.
+
+    Raises InputError if the vessel moves forward.
+    """
+    found = at_rest(raos, "a WAMIT file").with_phase_origin(raos.origin[:2])
+    lines = [" Stillhook: PER BETA I MOD PHA RE IM"]
+    for i, omega in enumerate(found.omega):
+        for j, degrees in enumerate(found.heading_deg):
+            for mode, value in enumerate(found.values[i, j], start=1):
+                cells = (
+                    abs(value), math.degrees(cmath.phase(value)), value.real, value.imag
+                )  # fmt: skip
+                first = f"{2.0 * math.pi / omega:.12E} {degrees:.9E} {mode:5d}"
+                lines.append(f" {first} {' '.join(f'{cell:.12E}' for cell in cells)}")
+    return "\n".join(lines) + "\n"
+
+
+def at_rest(raos: VesselRaos, what: str) -> VesselRaos:
+    """Return a table that a format without forward speed can hold.
+
+    Raises InputError if it holds at one.
+    """
+    if raos.speed != 0.0:
+        raise InputError(f"{raos.name}: {what} has no forward speed, got {raos.speed:g} m/s")
+    return raos
 
 
 def _refuse_forces(owner: str, text: str) -> None:
@@ -168,7 +201,7 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _of_body(owner: str, rows: FloatArray, body: int | None, notes: list[str]) -> FloatArray:
+def of_body(owner: str, rows: FloatArray, body: int | None, notes: list[str]) -> FloatArray:
     """Return the rows of one body, its modes counted from 1."""
     modes = rows[:, 2].astype(int)
     bodies = sorted(set(((modes - 1) // 6 + 1).tolist()))
@@ -214,7 +247,7 @@ def _column_kind(owner: str, rows: FloatArray) -> str:
     return "frequency (rad/s)" if off_first < off_last else "period (s)"
 
 
-def _six(
+def six_modes(
     owner: str,
     omega: FloatArray,
     beta: FloatArray,

@@ -17,11 +17,12 @@ from ..working import conclude, prepared_table
 ARGUMENTS = (
     options(
         """
-        file  a RAO file: CSV, WAMIT .4, OrcaFlex .yml, Capytaine .nc, MSS .mat, ShipX .re1; or a
-            bundled vessel
-        --read-as {csv,netcdf,wamit,orcaflex,capytaine,mss,shipx}  what it is (default: its contents
-            tell)
-        --out PATH  a .csv or .nc file, or a folder (default: out/<name of the vessel>)
+        file  a RAO file: CSV, WAMIT .4 or .out, OrcaFlex .yml, AQWA .LIS, Capytaine .nc, MSS .mat,
+            ShipX .re1; or a bundled vessel
+        --read-as {csv,netcdf,wamit,orcaflex,capytaine,mss,shipx,aqwa,wamit-listing}  what it is
+            (default: its contents tell)
+        --out PATH  a .csv, .nc, .4 (WAMIT) or .yml (OrcaFlex) file, or a folder (default: out/<name
+            of the vessel>)
         --speed V  which forward speed [m/s]
         --body BODY  which body of several
         --length L  WAMIT's ULEN [m] (default: 1)

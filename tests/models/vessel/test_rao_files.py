@@ -16,11 +16,13 @@ from scipy.interpolate import CubicSpline
 from scipy.io import savemat
 from vessel_tables import (
     DATA,
+    aqwa_text,
     mirrored,
     mss_vessel,
     orcaflex_text,
     shipx_text,
     swinging,
+    wamit_listing_text,
     wamit_text,
 )
 
@@ -98,8 +100,105 @@ def test_what_is_written_reads_back_to_the_last_digit(suffix: str, tmp_path: Pat
     assert np.allclose(found.heading, raos.heading, rtol=1e-15, atol=1e-15)
     for field in ("name", "origin", "phase_origin", "depth", "speed", "notes", "source"):
         assert getattr(found, field) == getattr(raos, field)
-    with pytest.raises(InputError, match=r"must end in \.csv or \.nc"):
+    with pytest.raises(InputError, match=r"must end in \.csv, \.4, \.yml, \.nc"):
         write_raos(tmp_path / "out.txt", raos)
+
+
+@pytest.mark.parametrize("suffix", [".4", ".yml"])
+def test_what_is_written_for_other_programs_reads_back(suffix: str, tmp_path: Path) -> None:
+    raos = replace(
+        RAOS, name='tug "A": 1', origin=(1.25, -0.1, 3.0), phase_origin=(7.0, 0.3), depth=48.5
+    )
+    path = write_raos(tmp_path / f"out{suffix}", raos)
+    told = {"origin": raos.origin, "depth": raos.depth} if suffix == ".4" else {}
+    found = read_raos(path, check=False, **told)
+    same(found, raos.with_phase_origin(raos.origin[:2]), 1e-9)
+    assert found.origin == raos.origin
+    assert found.depth == 48.5
+    if suffix == ".yml":
+        assert found.name == raos.name
+    with pytest.raises(InputError, match=r"has no forward speed, got 2\.5 m/s"):
+        write_raos(path, replace(RAOS, speed=2.5))
+
+
+def test_a_listing_of_aqwa_is_read_to_its_digits(tmp_path: Path) -> None:
+    placed = replace(RAOS, origin=(-3.0, 0.5, 1.5), phase_origin=(-3.0, 0.5), depth=1000.0)
+    text = aqwa_text(placed)
+    found = read_raos(put(tmp_path, "barge.LIS", text))
+    assert np.allclose(found.omega, RAOS.omega, rtol=6e-4)
+    assert np.allclose(found.heading, RAOS.heading, atol=1e-4)
+    assert np.allclose(found.values, RAOS.values, rtol=0.0, atol=3e-4)
+    assert (found.name, found.origin, found.depth) == ("barge", (-3.0, 0.5, 1.5), 1000.0)
+    assert found.phase_origin == (-3.0, 0.5)
+    two = put(tmp_path, "two.LIS", text + aqwa_text(replace(placed, depth=1000.0), structure=2))
+    with pytest.raises(InputError, match="there are structures 1, 2: say which, as in body=1"):
+        read_raos(two)
+    assert np.allclose(read_raos(two, body=2).values, found.values)
+    with pytest.raises(InputError, match="body must be one of 1, 2, got 3"):
+        read_raos(two, body=3)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("2023 R1", "19.0", r"a listing of AQWA 19\.0: those of 2023 R1 are read"),
+        ("VERSION", "EDITION", "a listing of AQWA of unknown version"),
+        ("       9.810", "      32.174", "GRAVITY must be that of metres, 9.81, got 32.174"),
+        ("   R.A.O.S-", "   F.A.O.S-", "no table R.A.O.S-VARIATION WITH WAVE PERIOD/FREQUENCY"),
+        ("PERIOD   FREQ   DIR", "FREQ   PERIOD   DIR", "columns must be PERIOD, FREQ, DIRECTION"),
+        ("STRUCTURE C.O.G.", "STRUCTURE", "line STRUCTURE C.O.G. of structure 1 is missing"),
+        ("WATER  DEPTH  . . . . . . . . . . . . . . . . =   1000.0000", "", "WATER DEPTH must be"),
+    ],
+)
+def test_a_listing_of_aqwa_that_is_wrong_is_answered(
+    before: str, after: str, words: str, tmp_path: Path
+) -> None:
+    text = aqwa_text(RAOS)
+    assert before in text
+    with pytest.raises(InputError, match=words):
+        read_raos(put(tmp_path, "a.LIS", text.replace(before, after)))
+
+
+def test_the_two_tables_of_aqwa_are_held_against_each_other(tmp_path: Path) -> None:
+    lines = aqwa_text(RAOS).splitlines()
+    row = next(n for n, line in enumerate(lines) if line.startswith("   78.54"))
+    lines[row] = f"{lines[row][:27]}    0.5000{lines[row][37:]}"
+    with pytest.raises(InputError, match=r"two tables of RAOs differ at 78\.54 s, direction 0"):
+        read_raos(put(tmp_path, "a.LIS", "\n".join(lines)))
+    lines = aqwa_text(RAOS).splitlines()
+    lines[row] = lines[row][:60]
+    with pytest.raises(InputError, match=r"amplitude and phase of six motions, got \d+ numbers"):
+        read_raos(put(tmp_path, "b.LIS", "\n".join(lines)))
+
+
+def test_a_listing_of_wamit_has_phases_to_a_degree(tmp_path: Path) -> None:
+    text = wamit_listing_text(replace(RAOS, depth=400.0), length=90.0, place=(5.0, 0.0, 2.0, 0.0))
+    found = read_raos(put(tmp_path, "tanker.out", text), check=False)
+    away = replace(RAOS, depth=400.0, phase_origin=(-5.0, 0.0)).with_phase_origin((0.0, 0.0))
+    assert np.allclose(found.omega, RAOS.omega, rtol=1e-6)
+    assert np.all(np.abs(found.values - away.values) <= 0.0088 * np.abs(away.values) + 1e-6)
+    assert (found.name, found.origin, found.depth) == ("tanker", (0.0, 0.0, 2.0), 400.0)
+    assert any("phases to a degree; the .4 file has more" in note for note in found.notes)
+    assert check_long_waves(read_raos(put(tmp_path, "b.out", wamit_listing_text(RAOS)))).ok
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("RESPONSE AMPLITUDE OPERATORS", "", "no RESPONSE AMPLITUDE OPERATORS in this listing of"),
+        ("9.81000", "32.1740", "Gravity must be that of metres, 9.81, got 32.174"),
+        ("PHIBODY =   0.0", "PHIBODY =  90.0", "PHIBODY must be 0, .* got 90 deg"),
+        ("XBODY", "ZBODY", "there is no XBODY of body 1"),
+        ("Length scale", "Length", "Length scale must be above 0, got nothing"),
+    ],
+)
+def test_a_listing_of_wamit_that_is_wrong_is_answered(
+    before: str, after: str, words: str, tmp_path: Path
+) -> None:
+    text = wamit_listing_text(RAOS)
+    assert before in text
+    with pytest.raises(InputError, match=words):
+        read_raos(put(tmp_path, "a.out", text.replace(before, after)))
 
 
 def test_a_csv_of_ones_own_tells_its_convention_in_remarks(tmp_path: Path) -> None:
@@ -376,7 +475,7 @@ def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no bundled vessel of this name"):
         read_raos("queen-mary")
     with pytest.raises(InputError, match="format must be one of csv"):
-        read_raos(put(tmp_path, "a.4", wamit_text(RAOS)), file_format="aqwa")
+        read_raos(put(tmp_path, "a.4", wamit_text(RAOS)), file_format="nemoh")
     with pytest.raises(InputError, match="draught says nothing about a wamit file"):
         read_raos(tmp_path / "a.4", draught="deep")
     known = r"ulen says nothing .* \(its options: body, depth, length, origin, waves\)"
@@ -494,6 +593,24 @@ def test_the_exciting_forces_of_an_ellipsoid_are_refused() -> None:
         InputError, match=r"ellipsoid\.3: WAMIT writes exciting forces to a \.3 file"
     ):
         read_raos(BEM / "ellipsoid.3")
+
+
+@needs_bem
+def test_a_box_of_aqwa_keeps_the_limits_of_long_waves() -> None:
+    box = read_raos(BEM / "aqwa_box1.LIS")
+    check = check_long_waves(box)
+    assert check.ok
+    assert {row.verdict for row in check.rows} == {"ok"}
+    assert (box.origin, box.depth, box.heading.size) == ((0.0, 2.0, -1.0), 70.0, 4)
+    # Phases relative to the crest above the centre of gravity: 2 m to port would turn them 12 deg.
+    sway = box.response(1.0, 0.5 * math.pi)[1]
+    assert complex(sway) == pytest.approx(-0.9091j, abs=1e-4)
+
+
+@needs_bem
+def test_a_listing_of_wamit_without_motions_says_what_it_has() -> None:
+    with pytest.raises(InputError, match="it has diffraction exciting forces and moments"):
+        read_raos(BEM / "ellipsoid.out")
 
 
 @needs_bem

@@ -49,6 +49,16 @@ def test_import_writes_netcdf_and_says_one_line_if_asked(
     assert (out.parent / "swing.svg").is_file()
 
 
+@pytest.mark.parametrize("ending", [".4", ".yml"])
+def test_import_writes_the_files_of_other_programs(
+    ending: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = write_raos(tmp_path / "swing.csv", RAOS), tmp_path / f"other{ending}"
+    assert main(["vessel", "import", str(file), "--out", str(out), "--quiet"]) == 0
+    assert capsys.readouterr().out.startswith("swing: in long waves")
+    assert np.allclose(read_raos(out).values, RAOS.values, rtol=1e-9)
+
+
 def test_a_file_that_contradicts_long_waves_ends_with_two_and_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
