@@ -35,7 +35,7 @@ from ..raos import VesselRaos
 from ..symmetry import SYMMETRIES
 from .aqwa import looks_like_aqwa, parse_aqwa
 from .capytaine_file import parse_capytaine
-from .csv_file import csv_text, looks_like_csv, parse_csv
+from .csv_file import WOULD_DO, csv_text, looks_like_csv, parse_csv
 from .long_waves import check_long_waves
 from .mss import parse_mss
 from .netcdf_file import is_ours, parse_netcdf, write_netcdf
@@ -133,6 +133,8 @@ def read_raos(
         - roll_damping: damping of roll to add, over the critical [-] (Capytaine).
         - inertia, stiffness: mass and hydrostatic stiffness (6, 6), where a Capytaine file has
           none.
+        - heading: the one heading of the file [deg], in its own convention, where it has no column
+          of them (CSV).
         - waves: whether the first column of a WAMIT file is the `period` or the `frequency`; if
           left out, the heave of long waves tells.
 
@@ -250,8 +252,8 @@ def file_format_of(owner: str, data: bytes) -> str:
             return kind
     first = text.strip()[:40]
     raise InputError(
-        f"{owner}: this is no RAO file of a kind that is known here (formats: {known}); it begins "
-        f"with {first!r}"
+        f"{owner}: this is no RAO file of a kind that is known here (formats: {known}; a table has "
+        f"columns such as {WOULD_DO}); it begins with {first!r}"
     )
 
 

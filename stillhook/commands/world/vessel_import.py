@@ -26,6 +26,7 @@ ARGUMENTS = (
         --speed V  which forward speed [m/s]
         --body BODY  which body of several
         --length L  WAMIT's ULEN [m] (default: 1)
+        --heading B  the one heading of a CSV file that has no column of them [deg]
         --waves {period,frequency}  first column of a WAMIT file (default: the heave of long waves
             tells)
         --symmetry {none,xz plane,yz plane,xz and yz planes,circular}  of the vessel, to fill in
@@ -39,6 +40,7 @@ ARGUMENTS = (
         """,
         speed=within(),
         length=within(),
+        heading=within(),
         depth=within(),
         origin=numbers(3),
         roll_damping=within(),
@@ -56,6 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
             speed=arguments.speed,
             body=int(body) if body and body.isdigit() else body,
             length=arguments.length,
+            heading=arguments.heading,
             depth=arguments.depth,
             origin=arguments.origin,
             vessel_type=arguments.vessel_type,

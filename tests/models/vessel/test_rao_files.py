@@ -227,10 +227,15 @@ def test_a_csv_of_ones_own_tells_its_convention_in_remarks(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ("heave_real", "heaves_real", "a column must be a motion"),
+        ("heave_real", "heaves_real", r"a column must be .* or a motion .*; got 'heaves_real'"),
         ("heave_imag", "heave_real", "each once"),
-        ("omega [rad/s]", "omega [furlongs]", "first column must be omega"),
-        ("heading [deg]", "direction", "second column must be heading"),
+        (
+            "omega [rad/s]",
+            "omega [furlongs]",
+            r"a column must be omega .* got 'omega \[furlongs\]'",
+        ),
+        ("omega [rad/s],", "yaw_amplitude,", "there must be a column omega .* 'Period .s.'"),
+        ("heading [deg]", "course", "got 'course'.*'Heave amp .m/m.', 'Heave phase .deg.' will do"),
         ("roll_real", "roll_real [inch]", r"unit \[inch\] of roll_real is not known"),
         ("# depth: inf", "# depth: shallow", "depth must be in .*, got 'shallow'"),
         ("# origin: 0.0, 0.0, 0.0", "# origin: 0.0, 0.0", "origin must be 3 numbers"),
@@ -244,6 +249,62 @@ def test_a_csv_that_is_wrong_is_answered_by_field(
     assert before in text
     with pytest.raises(InputError, match=words):
         read_raos(put(tmp_path, "b.csv", text.replace(before, after, 1)), file_format="csv")
+
+
+TABLE = [(40.0, 1.0, -1.0), (14.0, 0.8, -12.5), (8.0, 0.25, -60.0), (5.0, 0.05, 100.0)]
+
+
+@pytest.mark.parametrize(
+    ("head", "mark", "comma"),
+    [
+        ("Period (s); Heading (deg); Heave amp (m/m); Heave phase (deg)", ";", True),
+        ("Period [s],Wave direction [deg],Heave RAO [m/m],Heave phase [deg]", ",", False),
+        (
+            "sep=;\nT (s);Dir (\N{DEGREE SIGN});Heave Ampl. (-);Heave Phase (\N{DEGREE SIGN})",
+            ";",
+            False,
+        ),
+        ('"Wave period (s)"\t"beta"\t"Amplitude heave"\t"Phase heave"', "\t", True),
+        ("Heave amp; Heave phase (deg); Heading; Period (s)", ";", True),
+        ("Period (s); Heave amp (m/m); Heave phase (deg)", ";", True),
+        ("# heading: 180\nPeriod (s), Heave amp (m/m), Heave phase (deg)", ",", False),
+    ],
+)
+def test_a_table_is_read_by_the_names_that_people_write(
+    head: str, mark: str, comma: bool, tmp_path: Path
+) -> None:
+    lines = [head]
+    for period, size, phase in TABLE:
+        cells = [str(period), "180", str(size), str(phase)]
+        if head.startswith("Heave"):
+            cells = [*cells[2:], cells[1], cells[0]]
+        if not re.search("(?i)heading [(]|heading;|dir|beta", head):
+            del cells[1]
+        lines.append(mark.join(cells).replace(".", "," if comma else "."))
+    path = put(tmp_path, "tug.csv", "\n".join(lines).encode())
+    bare = head.startswith("Period (s); Heave")
+    found = read_raos(path, heading=180.0) if bare else read_raos(path)
+    assert found.heading_deg == pytest.approx([180.0])
+    assert 2.0 * math.pi / found.omega[::-1] == pytest.approx([p for p, _, _ in TABLE][::-1])
+    heave = found.mode("heave")[:, 0]
+    assert np.abs(heave) == pytest.approx([size for _, size, _ in TABLE])
+    assert np.degrees(np.angle(heave)) == pytest.approx([phase for *_, phase in TABLE])
+    if bare:
+        with pytest.raises(InputError, match=r"no column of headings .* --heading 180, or a line"):
+            read_raos(path)
+    elif "# heading" not in head:
+        with pytest.raises(InputError, match="heading must not be given: the file has a column"):
+            read_raos(path, heading=180.0)
+
+
+def test_mss_keeps_the_vessels_name(tmp_path: Path) -> None:
+    assert read_raos(put(tmp_path, "a.mat", mat(RAOS))).name == "swing"
+    # What every vessel is called that came by a file input.re1.
+    held = mss_vessel(RAOS)
+    held["vessel"]["main"]["name"] = "input"  # type: ignore[index]
+    target = io.BytesIO()
+    savemat(target, held)
+    assert read_raos(put(tmp_path, "supply.mat", target.getvalue())).name == "supply"
 
 
 def test_wamit_takes_frequencies_a_length_limits_and_several_bodies(tmp_path: Path) -> None:
@@ -461,6 +522,7 @@ def test_an_orcaflex_file_that_is_wrong_is_answered_by_key(
 def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
     for name, content, words in (
         ("a.yml", "name: subsea-crane\nsea: {}\n", "no RAO file of a kind that is known"),
+        ("a.csv", "Tp;Heave\n8;1\n", "a table has columns such as 'Period"),
         ("a.bin", bytes(range(256)) * 4, "no RAO file, but a binary file of no kind"),
         ("a.csv", b"PK\x03\x04\x14\x00xl/workbook.xml\x00", "no RAO file, but an Excel workbook"),
         ("a.4", b"\x89PNG\r\n\x1a\n\x00", r"no RAO file, but a picture \(PNG\)"),
@@ -528,6 +590,7 @@ def test_the_supply_vessel_of_mss_and_of_shipx_is_one() -> None:
     assert np.allclose(text.heading, matlab.heading, atol=1e-12)
     assert np.allclose(text.values, matlab.values, rtol=0.0, atol=1e-12)
     assert text.name == "Supply"
+    assert matlab.name == "supply"
     assert text.origin == pytest.approx((-5.38592, 0.0, 0.0))
 
 
