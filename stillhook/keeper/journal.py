@@ -123,8 +123,16 @@ class Journal:
     def _sync(self) -> None:
         try:
             os.fsync(self._file.fileno())
+            # A file that was removed takes everything without a word, and is gone with the run.
+            there = os.path.exists(self.path) and os.path.samestat(
+                os.stat(self.path), os.fstat(self._file.fileno())
+            )
         except OSError as error:
             raise self._unwritten(error) from error
+        if not there:
+            raise InputError(
+                f"{self.path}: was removed while it was written; nothing more can be kept there"
+            )
         self._synced = clock.monotonic()
 
     def _lock(self) -> None:
@@ -178,6 +186,8 @@ def _question(path: Path, what: str, line: bytes) -> dict[str, Any]:
         raise _spoilt(path, 1)
     if content is None or content.get("stillhook") != what or content.get("format") != FORMAT:
         raise _foreign(path, what)
+    if not isinstance(content.get("question"), dict):
+        raise _spoilt(path, 1)
     return dict(content["question"])
 
 
@@ -207,13 +217,14 @@ def _foreign(path: Path, what: str) -> InputError:
     )
 
 
-def _other_code(there: Mapping[str, str], asked: Mapping[str, str]) -> list[str]:
+def _other_code(there: object, asked: Mapping[str, str]) -> list[str]:
     for name, version in asked.items():
-        if name != _TOLD and there.get(name) != version:
+        own = there.get(name) if isinstance(there, Mapping) else None
+        if name != _TOLD and own != version:
             what = "Stillhook's own code" if name == "code" else name
             return [
-                f"it was computed with another version of {what} ({there.get(name)}, now "
-                f"{version}), and the numbers may not belong together"
+                f"it was computed with another version of {what} ({own}, now {version}), and the "
+                "numbers may not belong together"
             ]
     return []
 

@@ -165,6 +165,27 @@ def checked(text):
     return b'{"crc": %d, "of": %b}\n' % (zlib.crc32(text), text)
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("seed", 98.5, "its question is spoilt"),
+        ("seed", -1, "seed must be at least 0"),
+        ("samples", "many", "its question is spoilt"),
+        ("samples", 10**12, "samples must be in"),
+        ("metrics", [""], "there is no metric ''"),
+        ("duration", None, "its question is spoilt"),
+        ("options", 3, "its question is spoilt"),
+    ],
+)
+def test_a_question_of_other_kinds_of_values_is_refused(half, field, value, message):
+    first, *rest = (half / JOURNAL).read_bytes().splitlines(keepends=True)
+    content = json.loads(first)["of"]
+    content["question"][field] = value
+    (half / JOURNAL).write_bytes(line(content) + b"".join(rest))
+    with pytest.raises(InputError, match=message):
+        resume_sweep(half, engine="serial")
+
+
 def test_numbers_come_back_to_the_bit(tmp_path):
     values = {"a": 0.1 + 0.2, "b": math.nan, "c": -math.inf, "d": 5e-324, "e": None, "f": "x"}
     with Journal(tmp_path / "j", "study", {"n": math.inf}, lambda key, found: None) as journal:
