@@ -5,6 +5,7 @@ import gzip
 import os
 import stat
 import sys
+import threading
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -153,7 +154,8 @@ def replace_atomically(path: str | Path, write: Callable[[Path], object]) -> Pat
     target = Path(path)
     if os.path.exists(target) and not (os.path.isfile(target) or os.path.isdir(target)):
         raise InputError(f"{target}: cannot be written: is a device or a pipe")
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    own = f"{os.getpid()}-{threading.get_ident()}"  # two may write the same file at once
+    temporary = target.with_name(f".{target.name}.{own}.tmp")
     try:
         write(temporary)
         os.replace(temporary, target)

@@ -118,7 +118,9 @@ def long_wave_verdict(check: LongWaveCheck) -> str:
     if check.mistake:
         return f"in {where} the motions look like {check.mistake}"
     if check.ok:
-        return f"in {where} it heaves with the water and turns with its slope"
+        turns = any(row.motion in ("roll", "pitch") for row in check.rows)
+        what = "turns with its slope" if turns else "has no roll and pitch that could be checked"
+        return f"in {where} it heaves with the water and {what}"
     return check.remarks[0] if check.remarks else f"in {where} it does not move as the water does"
 
 

@@ -4,6 +4,8 @@ import gzip
 import os
 import re
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from models.basics import (
     cache_folder,
     read_bytes,
     read_text,
+    replace_atomically,
     write_text_atomically,
 )
 
@@ -73,3 +76,20 @@ def test_a_binary_is_named_for_what_it_is(content: bytes, name: str, tmp_path: P
     path.write_bytes(content)
     with pytest.raises(InputError, match=re.escape(f"case.yaml: is no text file, but {name}")):
         read_text(path)
+
+
+def test_two_may_write_one_file_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    together = threading.Barrier(2)
+
+    def write(text: str) -> Path:
+        def fill(place: Path) -> None:
+            place.write_text(text)
+            together.wait(10.0)  # both have written before either renames
+
+        return replace_atomically(path, fill)
+
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(write, ["one", "two"])) == [path, path]
+    assert path.read_text() in {"one", "two"}
+    assert [item.name for item in tmp_path.iterdir()] == ["a.txt"]

@@ -76,6 +76,18 @@ def test_a_file_that_contradicts_long_waves_ends_with_two_and_one_line(
     assert "wrong sign" in said.out
 
 
+def test_a_table_of_heave_alone_is_not_said_to_turn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "heave.csv"
+    file.write_text("Period (s);Heave amp (m/m);Heave phase (deg)\n40;1,0;0\n12;0,8;-10\n")
+    words = ["vessel", "import", str(file), "--heading", "180", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "it heaves with the water and has no roll and pitch that could be checked" in said
+    assert "no columns for surge, sway, roll, pitch, yaw" in " ".join(said.split())
+
+
 def test_doubt_and_no_check_are_told_by_the_exit_status(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
