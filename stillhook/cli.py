@@ -3,8 +3,9 @@
     arguments -> parser -> one module of `stillhook.commands` -> exit status
 
 Exit status: 0 all is well; 1 the design is not ok (unstable, infeasible, a limit broken, not
-verified), or a run diverged; 2 bad input; 3 an error in Stillhook itself; 130 interrupted.  The
-commands are imported when they run, so that ``stillhook --help`` imports nothing heavy.
+verified), a run diverged, or a vessel's RAOs are doubtful or not checked; 2 bad input; 3 an error
+in Stillhook itself; 130 interrupted.  The commands are imported when they run, so that
+``stillhook --help`` imports nothing heavy.
 """
 
 import argparse
@@ -24,8 +25,8 @@ OK, NOT_OK, BAD_INPUT, OUR_FAULT, INTERRUPTED = 0, 1, 2, 3, 130
 
 _EPILOG = """\
 exit status: 0 all is well; 1 the design is not ok: unstable, infeasible, a
-limit broken, not verified; or a run diverged; 2 bad input; 3 an error in
-Stillhook itself; 130 interrupted
+limit broken, not verified; or a run diverged, or RAOs are doubtful or not
+checked; 2 bad input; 3 an error in Stillhook itself; 130 interrupted
 
 to begin with:
   stillhook cases                     what comes with the toolkit
@@ -163,6 +164,9 @@ def _failed(error: Exception) -> int:
 
     if isinstance(error, InputError):
         print(error, file=sys.stderr)
+        return BAD_INPUT
+    if isinstance(error, OSError) and error.filename is not None:  # a place that was named
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
         return BAD_INPUT
     hint = "run the command again with --debug to see where"
     if isinstance(error, StillhookError):

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     )
     from .files import (
         GZIP,
+        binary_name,
         cache_folder,
+        check_file,
         file_stamp,
         keep_latest,
         read_bytes,

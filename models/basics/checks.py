@@ -62,7 +62,7 @@ def check_range(
     """
     try:
         number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     inside = (number > low if open_low else number >= low) and (
         number < high if open_high else number <= high
@@ -82,7 +82,7 @@ def check_finite(owner: str, name: str, values: npt.ArrayLike) -> FloatArray:
     """
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{owner}: {name} must be numbers, got {values!r}") from error
     finite = np.isfinite(array)
     if not finite.all():

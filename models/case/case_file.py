@@ -6,6 +6,7 @@ YAML is read as version 1.2; JSON is a part of it.  TOML goes through the same m
 name the field alone, as the standard library does not say in which line a value stood.
 """
 
+import os
 import tomllib
 import warnings
 from collections.abc import Mapping
@@ -13,9 +14,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..basics import InputError, PhysicsWarning, read_text
+from ..basics import InputError, PhysicsWarning
 from ..casefile import Path as FieldPath
-from ..casefile import line_of, message_line, read_yaml, suggestion
+from ..casefile import case_text, line_of, message_line, read_yaml, suggestion
 from .case import Case
 from .plausibility import changed_meanings, remarks
 
@@ -134,10 +135,10 @@ def _bundled_text(name: str) -> str:
 
 
 def _file_text(path: Path) -> str:
-    if not path.exists():
+    if not os.path.exists(path):  # a name may be too long to be asked about
         near = suggestion(path.name, _bundled_names())
         raise InputError(f"{path}: no such case file or bundled case; {near}")
-    return read_text(path)
+    return case_text(path)
 
 
 def _parsed(text: str, kind: str, source: str) -> tuple[Any, dict[FieldPath, int]]:
@@ -150,4 +151,8 @@ def _parsed(text: str, kind: str, source: str) -> tuple[Any, dict[FieldPath, int
         digits = place.removeprefix("line ").partition(",")[0]
         line = int(digits) if digits.isdigit() else 0
         raise InputError(message_line(source, line, (), f"is not TOML: {problem}")) from None
+    except RecursionError:
+        raise InputError(f"{source}: is nested too deep; no case is") from None
+    except ValueError as error:  # a whole number of thousands of digits
+        raise InputError(f"{source}: is not TOML: {str(error).partition(';')[0]}") from None
     return data or None, {}

@@ -13,6 +13,7 @@ from .contents import Contents
 
 Finding = tuple[str, str]
 
+_STRETCH = 0.05  # of its length that a rope is stretched at rest: wire has parted by then
 _SOFT = 0.05  # of the rope's stiffness, below which what is in series with it is implausible
 
 
@@ -64,6 +65,14 @@ def remarks(case: Contents) -> Iterator[Finding]:
         )
     yield from _soft(case)
     rope = case.rope
+    hung = case.payload.submerged_weight + case.rigging.block_weight + 0.5 * rope.submerged_weight
+    stretch = hung / rope.stiffness / rope.length
+    if stretch > _STRETCH:
+        yield (
+            "rope.axial_stiffness" if rope.modulus is None else "rope.modulus",
+            f"the load at rest stretches the rope by {100.0 * stretch:.2g} % of its length: wire "
+            f"parts at 2 %, fibre ropes work below {100.0 * _STRETCH:g} %",
+        )
     if rope.damping_measured is not None:
         lowest, highest = rope.damping_measured
         if not lowest <= rope.damping_ratio <= highest:

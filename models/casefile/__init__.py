@@ -14,6 +14,6 @@ if TYPE_CHECKING:
     from .paths import plain, replaced
     from .quantity import Quantity
     from .section import Section, describe, problems
-    from .yaml_lines import read_yaml, yaml_text
+    from .yaml_lines import case_text, read_yaml, yaml_text
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -2,25 +2,65 @@
 
 ruamel.yaml's pure parser is used because it follows YAML 1.2, in which `1e6` is a number and `no`
 is a word; PyYAML and the C parser follow 1.1, in which they are a text and False.  The file is
-composed into nodes once: the nodes give the lines and the repeated keys, and the data.
+composed into nodes once: the nodes give the lines and the repeated keys, and the data.  Composing
+ends at a limit of nodes and of depth: what is longer or deeper is no case, whatever it is.
 """
 
 import io
 from collections.abc import Iterator, Mapping
+from pathlib import Path as FilePath
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
+from typing_extensions import override
 
-from ..basics import InputError
+from ..basics import InputError, read_text
 from .messages import Path, message_line
 
 _DEEPEST = 20
 """Nesting at which reading stops: a case has five levels; an alias may refer to itself."""
 
 _MOST = 100_000  #: Number of nodes at which reading stops: aliases of aliases grow without bound.
+
+_LARGEST = 4_000_000  # bytes: more than so many nodes take
+
+
+class _Composer(Composer):
+    """Nodes of a text, up to the limits; an anchor that is set anew is no matter."""
+
+    def __init__(self, loader: Any = None) -> None:
+        super().__init__(loader)
+        self.warn_double_anchors = False
+        self._count = self._deep = 0
+
+    @override
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Return the next node, or raise a sentence without its source."""
+        self._count += 1
+        self._deep += 1
+        if self._count > _MOST:
+            raise _TooLongError(f"has more than {_MOST} entries; no case is that long")
+        if self._deep > _DEEPEST + 1:
+            raise _TooLongError(f"is nested deeper than {_DEEPEST} levels; no case is")
+        node = super().compose_node(parent, index)
+        self._deep -= 1
+        return node
+
+
+class _TooLongError(Exception):
+    """A text that is too long or too deep."""
+
+
+def case_text(path: str | FilePath) -> str:
+    """Return the text of a case file, or of another file of sections.
+
+    Raises InputError if it cannot be read, is no text, or is larger than such files are.
+    """
+    return read_text(path, _LARGEST)
 
 
 def read_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
@@ -30,7 +70,8 @@ def read_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
 
     Raises InputError if the text is not YAML, holds several documents or repeats keys.
     """
-    parser = YAML(typ="safe", pure=True)
+    parser, loader = YAML(typ="safe", pure=True), YAML(typ="safe", pure=True)
+    parser.Composer = _Composer
     try:
         documents = list(parser.compose_all(text))
         if len(documents) > 1:
@@ -50,13 +91,15 @@ def read_yaml(text: str, source: str) -> tuple[Any, dict[Path, int]]:
                 raise InputError(f"{source}: has more than {_MOST} entries; no case is that long")
         if repeated:
             raise InputError("\n".join(repeated))
-        return YAML(typ="safe", pure=True).load(text), lines
+        return loader.constructor.construct_document(documents[0]), lines
+    except _TooLongError as error:
+        raise InputError(f"{source}: {error}") from None
     except MarkedYAMLError as error:
         raise InputError(_sentence(error, source)) from error
     except (YAMLError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        first = str(error).partition("\n")[0]
+        first = str(error).partition("\n")[0].partition(";")[0]
         raise InputError(f"{source}: is not YAML: {first}") from error
 
 

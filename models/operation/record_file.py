@@ -48,6 +48,7 @@ from .hermite import interpolated
 from .six_dof import tip_heave
 
 _FEWEST = 8  # samples: what a spline of fifth degree needs to be one
+_SHORT = 60.0  # s: some waves
 _UNEVEN = 0.05  # of the mean step that a sample may be early or late
 _DISAGREEMENT = 0.2  # of a measured velocity's rms that may not be the displacement's derivative
 
@@ -101,16 +102,17 @@ class RecordMotion:
         -----
         PhysicsWarning
             If a measured velocity or acceleration is not the displacement's derivative, or an
-            angle is so large that it is probably in degrees.
+            angle is so large that it is probably in degrees; if the record is shorter than a
+            minute.
         """
         source = Path(path).name
         if tip is None:
             columns = read_columns(path, _KINDS, required=("time", "displacement"))
-            return cls.from_arrays(**columns, detrend=detrend, source=source)
+            return _long_enough(cls.from_arrays(**columns, detrend=detrend, source=source))
         motions = read_columns(path, _SIX_DOF, required=tuple(_SIX_DOF))
         time = motions.pop("time")
         z = tip_heave(**motions, tip=tip, exact=exact, source=source)
-        found = cls.from_arrays(time, z, detrend=detrend, source=source)
+        found = _long_enough(cls.from_arrays(time, z, detrend=detrend, source=source))
         place = ", ".join(f"{value:g}" for value in tip)
         return replace(found, description=f"{found.description}, tip at ({place}) m")
 
@@ -208,6 +210,18 @@ class RecordMotion:
             step=step,
             evaluate=interpolated(nodes, last, self.step, step),
         )
+
+
+def _long_enough(record: RecordMotion) -> RecordMotion:
+    """Return a record, with a warning if it has but a few waves."""
+    if record.duration < _SHORT:
+        warnings.warn(
+            f"{record.description}: is shorter than {_SHORT:g} s, a few waves: statistics and "
+            "extremes of a run say next to nothing",
+            PhysicsWarning,
+            stacklevel=3,
+        )
+    return record
 
 
 def even_step(owner: str, time: FloatArray) -> float:

@@ -37,7 +37,7 @@ class Gearbox(Section):
 class _Motor(Section):
     """What every motor has."""
 
-    inertia: Annotated[float, Quantity("inertia", 0.0, 1e6, open_low=True)]
+    inertia: Annotated[float, Quantity("inertia", 1e-6, 1e6)]
     """Moment of inertia of the rotor (of all motors on the drum together)."""
     viscous_friction: Annotated[float, Quantity("rotary damping", 0.0, 1e5)] = 0.0
     """Viscous friction of the drive train at the motor's shaft."""
@@ -46,7 +46,7 @@ class _Motor(Section):
     limits, and in the simulation."""
     friction_speed: Annotated[float, Quantity("angular speed", 0.0, 1000.0, open_low=True)] = 1.0
     """Speed over which dry friction changes its sign, as tanh(speed/friction_speed)."""
-    thermal_time_constant: Annotated[float, Quantity("time", 0.0, 1e6, open_low=True)] = 1800.0
+    thermal_time_constant: Annotated[float, Quantity("time", 1.0, 1e6)] = 1800.0
     """Time constant of the motor's temperature (first order, driven by the torque squared)."""
     temperature_rise: Annotated[
         float, Quantity("temperature difference", 0.0, 1000.0, open_low=True)

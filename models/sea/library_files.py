@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import GZIP, FloatArray, InputError, check_hdf5, read_bytes
+from ..basics import GZIP, FloatArray, InputError, check_file, check_hdf5, read_bytes
 from .quality import RawRecords
 
 FORMATS: dict[str, str] = {
@@ -99,6 +99,7 @@ def read_with_library(path: str, name: str) -> RawRecords:
 @contextlib.contextmanager
 def _unpacked(path: str) -> Iterator[str]:
     """Yield the path of the file, or of an unpacked copy of one that is packed with gzip."""
+    check_file(path)
     with open(path, "rb") as file:
         packed = file.read(2) == GZIP
     if not packed:

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from ..basics import (
     FloatArray,
     InputError,
+    binary_name,
     check_ascending,
     check_choice,
     check_range,
@@ -238,6 +239,9 @@ def _guess_format(path: str) -> str:
         raise InputError(f"{path}: is empty; a file of wave spectra is wanted")
     if raw.startswith((b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF")):
         return "netcdf"
+    name = binary_name(raw)
+    if name and not raw.startswith(b"MATLAB"):
+        raise InputError(f"{path}: is no file of wave spectra, but {name}")
     head = raw[:4000].decode("utf-8-sig", errors="replace")
     first = head.lstrip().splitlines()[0] if head.strip() else ""
     if is_ndbc(head):

@@ -62,6 +62,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
 }
 """What each kind needs, besides the height that all standard forms do."""
 
+SHORTEST = 0.5  #: Shortest period of a sea [s]: of ripples 0.4 m long.
 _UNITS = {"peak_period": "s", "significant_period": "s", "depth": "m", "width": "rad/s"}
 
 HIGHEST_FREQUENCY = 60.0
@@ -247,7 +248,9 @@ class SeaSpectrum:
             if wanted and value is None:
                 needed = f"{name} [{unit}]" if unit else name
                 raise InputError(f"sea: spectrum {self.kind} needs {needed}")
-            if wanted and unit:
+            if wanted and unit == "s":
+                check_range("sea", name, value, low=SHORTEST, unit=unit)
+            elif wanted and unit:
                 check_range("sea", name, value, low=0.0, unit=unit, open_low=True)
 
     @property

@@ -25,7 +25,7 @@ from pydantic import (
 
 from ..basics import GRAVITY, InputError, file_stamp, range_text
 from ..casefile import DataFile, Quantity, Section, problems
-from .sea import FIELDS, SeaSpectrum, takes
+from .sea import FIELDS, SHORTEST, SeaSpectrum, takes
 from .shapes import breaking_steepness, fully_arisen, gaussian_widths, jonswap_gamma
 from .spreading import Spreading
 from .table import SpectrumTable, row_faults
@@ -33,7 +33,7 @@ from .table import SpectrumTable, row_faults
 # T_p of the 1975 form over its T_S: it peaks at f T_mean = 0.54^(1/4) with T_mean = 0.9 T_S.
 _PEAK_OF_SIGNIFICANT = 0.9 / math.sqrt(math.sqrt(0.54))
 
-_HIGHEST = 30.0
+_LOWEST, _HIGHEST = 0.001, 30.0  # of significant heights [m]: from a ripple
 _MOST_PARTS = 10
 
 # Files written before each kind had its own fields carry these under every kind.
@@ -54,7 +54,7 @@ def _readable(file: str) -> str:
 
 _Height = Annotated[
     float,
-    Quantity("length", 0.0, _HIGHEST, open_low=True),
+    Quantity("length", _LOWEST, _HIGHEST),
     Field(
         description="Significant wave height H_s (4 standard deviations of the surface elevation; "
         "the 1975 form takes H_mean = 0.625 H_s). May be left out where `wind_speed`, the measured "
@@ -63,7 +63,7 @@ _Height = Annotated[
 ]
 _PeakPeriod = Annotated[
     float,
-    Quantity("time", 0.0, 60.0, open_low=True),
+    Quantity("time", SHORTEST, 60.0),
     Field(
         description="Period of the spectrum's peak; not for `bretschneider-1975`, "
         "`pierson-moskowitz`, `measured` and `sum`."
@@ -320,7 +320,7 @@ class Bretschneider1975Sea(_SeaByWind):
 
     spectrum: Literal["bretschneider-1975"]
     """`bretschneider-1975`: Bretschneider's in the variables of the 1975 thesis."""
-    significant_period: Annotated[float, Quantity("time", 0.0, 60.0, open_low=True)] = Field(
+    significant_period: Annotated[float, Quantity("time", SHORTEST, 60.0)] = Field(
         default_factory=lambda data: fully_arisen(data["wind_speed"])[1]
     )
     """Significant period T_S, for `bretschneider-1975` only (T_mean = 0.9 T_S)."""

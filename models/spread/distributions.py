@@ -15,7 +15,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields, replace
+from numbers import Real
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -41,6 +42,12 @@ class Distribution(ABC):
     widths: ClassVar[tuple[str, ...]] = ()  #: The fields that are distances; the others are places.
 
     def __post_init__(self) -> None:
+        for field in fields(self):
+            if field.default is MISSING and getattr(self, field.name) is None:
+                raise InputError(f"{self.name}: {field.name} is missing")
+        for name, value in self._given().items():
+            for each in value if isinstance(value, tuple) else (value,):
+                _check_value(self.name, name, each)
         if self.numeric:
             self._check()
 
@@ -111,6 +118,21 @@ class Bell(Distribution):
             "high": last if math.isfinite(last) else None,
         }
         return replace(self, **cuts)
+
+
+def _check_value(kind: str, name: str, value: object) -> None:
+    """Raise InputError if a value is neither a text nor a number that a float can hold."""
+    if isinstance(value, str):
+        return
+    known = isinstance(value, Real) and not isinstance(value, bool)
+    try:
+        float(value if known else 0.0)  # type: ignore[arg-type]
+    except OverflowError:
+        known = False
+    if not known:
+        raise InputError(
+            f"{kind}: {name} must be a number or a text with a unit, got {value!r:.60}"
+        )
 
 
 def _number(value: Value | None) -> float:
@@ -297,10 +319,11 @@ class Samples(Distribution):
     def __init__(self, values: Sequence[Value] | FloatArray) -> None:
         if isinstance(values, str):
             raise InputError(f"samples: must be a list of values, got {values!r}")
-        object.__setattr__(
-            self, "values", tuple(v if isinstance(v, str) else float(v) for v in values)
-        )
-        if not self.values:
+        for value in values:
+            _check_value("samples", "a value", value)
+        own = tuple(v if isinstance(v, str) else float(v) for v in values)
+        object.__setattr__(self, "values", own)
+        if not own:
             raise InputError("samples: must have at least one value, got none")
         self.__post_init__()
 

@@ -26,10 +26,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import FloatArray, InputError, check_range, read_text
+from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..casefile import Path as Place
-from ..casefile import line_of, message_line, read_yaml, suggestion, yaml_text
+from ..casefile import case_text, line_of, message_line, read_yaml, suggestion, yaml_text
 from ..operation import PREFIX as FAULTS
 from .distributions import KINDS, Distribution, Samples, Uniform, at_ends
 from .fields import ALIASES, DRAG, GAINS, Field, field_of, resolved
@@ -126,12 +126,19 @@ class Spread:
             except InputError as error:
                 raise refused(("vary", str(name)), error) from None
         pairs: dict[tuple[str, str], float] = {}
-        for k, entry in enumerate(data.get("correlations") or ()):
+        given = data.get("correlations") or ()
+        if not isinstance(given, list | tuple):
+            raise refused(("correlations",), f"must be a list, got {given!r:.60}")
+        for k, entry in enumerate(given):
             if not isinstance(entry, list | tuple) or len(entry) != 3:
                 text = f"must be [path, path, rank correlation], got {entry!r}"
                 raise refused(("correlations", k), text)
             pairs[str(entry[0]), str(entry[1])] = entry[2]
-        return cls(found, pairs)
+        try:
+            return cls(found, pairs)
+        except InputError as error:
+            where = ("correlations",) if found else ("vary",)
+            raise refused(where, str(error).removeprefix("spread: ")) from None
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Spread:
@@ -139,7 +146,7 @@ class Spread:
 
         Raises InputError if there is no such file or it is no spread; file and line are named.
         """
-        data, lines = read_yaml(read_text(path), str(path))
+        data, lines = read_yaml(case_text(path), str(path))
         return cls.from_dict(data, source=str(path), lines=lines)
 
     @property
@@ -414,11 +421,9 @@ def _distribution(value: Any) -> Distribution:
 
 def _made(kind: Any, name: str, values: dict[str, Any]) -> Distribution:
     known = [f.name for f in fields(kind)]
-    for key, value in values.items():
+    for key in values:
         if key not in known:
             raise InputError(f"{name}: {key} is unknown; {suggestion(key, known)}")
-        if isinstance(value, bool) or not isinstance(value, str | int | float):
-            raise InputError(f"{name}: {key} must be a number or a text with a unit, got {value!r}")
     try:
         made: Distribution = kind(**values)
     except TypeError:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import ComplexArray, FloatArray, InputError
+from ..basics import ComplexArray, FloatArray, InputError, binary_name
 from .raos import VesselRaos
 from .symmetry import completed, looks_symmetric
 
@@ -27,8 +27,10 @@ def text_of(owner: str, data: bytes) -> str:
 
     Raises InputError if they are no text.
     """
-    if b"\x00" in data:
-        raise InputError(f"{owner}: this is a binary file, not the text that was expected")
+    name = binary_name(data)
+    if name or b"\x00" in data:
+        what = name or "a binary file"
+        raise InputError(f"{owner}: this is no text, as was expected, but {what}")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

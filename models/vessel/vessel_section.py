@@ -73,7 +73,7 @@ class Crane(Section):
     slew: Annotated[float, Quantity("angle", -7.0, 7.0)]
     """Direction of the boom, counter-clockwise seen from above: 0 over the bow, 90 deg over port,
     -90 deg over starboard, 180 deg over the stern."""
-    boom_length: Annotated[float, Quantity("length", 0.0, 300.0, open_low=True)]
+    boom_length: Annotated[float, Quantity("length", 0.1, 300.0)]
     """Length of the boom from its heel."""
     boom_angle: Annotated[float, Quantity("angle", -1.6, 1.6)]
     """Angle of the boom above the horizontal."""

@@ -127,8 +127,10 @@ def prepared_table(
     arguments: argparse.Namespace, name: str, table: str
 ) -> tuple[OutputFolder, Path]:
     """Return the folder for a vessel, and its table there: the file that is given, or `table`."""
+    from models.vessel.readers import ENDINGS
+
     target = place_for(arguments, name)
-    alone = target.suffix.lower() in {".csv", ".nc"}
+    alone = target.suffix.lower() in ENDINGS
     folder = prepared(arguments, target.parent if alone else target)
     return folder, target if alone else folder.path / table
 

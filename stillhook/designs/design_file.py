@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import types
 import typing
 from collections.abc import Mapping
@@ -21,7 +22,7 @@ import numpy as np
 
 from models.basics import InputError, write_text_atomically
 from models.case import Case
-from models.casefile import line_of, message_line, read_yaml, suggestion, yaml_text
+from models.casefile import case_text, line_of, message_line, read_yaml, suggestion, yaml_text
 from synth.design import Design
 from synth.question import PAYLOAD, controller_for, difference_text
 from synth.verify import Verification
@@ -154,17 +155,12 @@ def _of_format_1(data: dict[str, Any], reader: _Reader, *, structure: bool) -> d
 
 
 def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such design file") from None
-    except IsADirectoryError:
+    if os.path.isdir(path):
         hint = f"; did you mean {path / 'design.yaml'}?" if (path / "design.yaml").exists() else ""
-        raise InputError(f"{path}: is a folder; a design file is wanted{hint}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not a text file in UTF-8 (byte {error.start})") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise InputError(f"{path}: is a folder; a design file is wanted{hint}")
+    if not os.path.exists(path):
+        raise InputError(f"{path}: no such design file")
+    return case_text(path)
 
 
 def _encoded(value: Any) -> Any:

@@ -20,12 +20,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from models.basics import InputError
+from models.basics import InputError, check_file
 
 FORMAT = 2  #: Version of what stands in a line.
 
 _BEGIN = b'{"crc": '
 _LINE = re.compile(rb'\{"crc": (\d+), "of": (\{.*\})\}\n')
+_LARGEST = 20_000_000_000  # bytes
 _SYNC = 1.0  # a power failure may cost as much of the work [s]; a killed process costs none
 _TOLD = "python"  # is told in the question, and may differ
 
@@ -46,6 +47,8 @@ class Journal:
     def __init__(self, path: Path, what: str, question: Mapping[str, Any], take: Take) -> None:
         self.path, self._what = path, what
         try:
+            if path.exists():
+                check_file(path, _LARGEST)
             self._file: BinaryIO = open(path, "a+b")  # noqa: SIM115
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from error
@@ -120,8 +123,16 @@ class Journal:
     def _sync(self) -> None:
         try:
             os.fsync(self._file.fileno())
+            # A file that was removed takes everything without a word, and is gone with the run.
+            there = os.path.exists(self.path) and os.path.samestat(
+                os.stat(self.path), os.fstat(self._file.fileno())
+            )
         except OSError as error:
             raise self._unwritten(error) from error
+        if not there:
+            raise InputError(
+                f"{self.path}: was removed while it was written; nothing more can be kept there"
+            )
         self._synced = clock.monotonic()
 
     def _lock(self) -> None:
@@ -148,6 +159,8 @@ def question_in(path: Path, what: str) -> dict[str, Any]:
     Raises InputError if there is no journal, or it is none of this version's.
     """
     try:
+        if path.exists():
+            check_file(path, _LARGEST)
         with open(path, "rb") as file:
             line = file.readline()
     except OSError:
@@ -173,6 +186,8 @@ def _question(path: Path, what: str, line: bytes) -> dict[str, Any]:
         raise _spoilt(path, 1)
     if content is None or content.get("stillhook") != what or content.get("format") != FORMAT:
         raise _foreign(path, what)
+    if not isinstance(content.get("question"), dict):
+        raise _spoilt(path, 1)
     return dict(content["question"])
 
 
@@ -181,7 +196,10 @@ def _content(line: bytes) -> dict[str, Any] | None:
     match = _LINE.fullmatch(line)
     if match is None or zlib.crc32(match[2]) != int(match[1]):
         return None
-    content: dict[str, Any] = json.loads(match[2])
+    try:
+        content: dict[str, Any] = json.loads(match[2])
+    except (ValueError, RecursionError):  # a good check sum, but no text of ours
+        return None
     return content
 
 
@@ -199,13 +217,14 @@ def _foreign(path: Path, what: str) -> InputError:
     )
 
 
-def _other_code(there: Mapping[str, str], asked: Mapping[str, str]) -> list[str]:
+def _other_code(there: object, asked: Mapping[str, str]) -> list[str]:
     for name, version in asked.items():
-        if name != _TOLD and there.get(name) != version:
+        own = there.get(name) if isinstance(there, Mapping) else None
+        if name != _TOLD and own != version:
             what = "Stillhook's own code" if name == "code" else name
             return [
-                f"it was computed with another version of {what} ({there.get(name)}, now "
-                f"{version}), and the numbers may not belong together"
+                f"it was computed with another version of {what} ({own}, now {version}), and the "
+                "numbers may not belong together"
             ]
     return []
 

@@ -79,7 +79,8 @@ def rao_report(raos: VesselRaos, check: LongWaveCheck, *, stem: str = "raos") ->
         name=raos.name,
         about=raos.source,
         status=long_wave_verdict(check),
-        mark="ok" if check.ok else "DOUBTFUL" if check.long else "not checked",
+        ok=check.ok,
+        mark=_mark(check),
         sections=[
             ReportSection("", [pairs(_facts(raos)), drawing]),
             ReportSection("Found and converted", [f"- {note}" for note in raos.notes]),
@@ -98,12 +99,17 @@ def long_waves(check: LongWaveCheck) -> ReportSection:
             Written(row.heading_deg, f"{row.heading_deg:.0f} deg"),
             row.motion,
             *(c for x in (row.found, row.expected) for c in (_size(x), _phase(x))),
-            row.verdict,
+            row.verdict if check.long else "not long",
         )
         for row in check.rows
     ]
     title = f"Long waves, {check.omega:.3g} rad/s; angles over the wave slope"
     return ReportSection(title, [Table(columns=heads, rows=rows)])
+
+
+def _mark(check: LongWaveCheck) -> str:
+    """Return the word before the verdict."""
+    return "ok" if check.ok else "DOUBTFUL" if check.long else "not checked"
 
 
 def long_wave_verdict(check: LongWaveCheck) -> str:
@@ -112,7 +118,9 @@ def long_wave_verdict(check: LongWaveCheck) -> str:
     if check.mistake:
         return f"in {where} the motions look like {check.mistake}"
     if check.ok:
-        return f"in {where} it heaves with the water and turns with its slope"
+        turns = any(row.motion in ("roll", "pitch") for row in check.rows)
+        what = "turns with its slope" if turns else "has no roll and pitch that could be checked"
+        return f"in {where} it heaves with the water and {what}"
     return check.remarks[0] if check.remarks else f"in {where} it does not move as the water does"
 
 
@@ -285,7 +293,8 @@ def hull_report(vessel: HullVessel, check: LongWaveCheck, *, stem: str = "raos")
         name=vessel.raos.name,
         about=vessel.raos.source,
         status=long_wave_verdict(check),
-        mark="ok" if check.ok else "DOUBTFUL",
+        ok=check.ok,
+        mark=_mark(check),
         sections=[
             ReportSection("", [afloat, motions, pairs(_about(vessel)), *drawings]),
             long_waves(check),

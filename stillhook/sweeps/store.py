@@ -15,11 +15,12 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 import numpy as np
+from pydantic import TypeAdapter
 
-from models.basics import BoolArray, InputError
+from models.basics import BoolArray, InputError, check_range
 from models.case import Case
 from models.spread import Spread
 from synth.sweeps import ATTRIBUTE
@@ -28,7 +29,7 @@ from ..controllers import recipe_from
 from ..keeper import Journal, question_in, versions
 from .export import ENDINGS, check_writable
 from .time_cases import TimeQuestion, seed_of
-from .time_metrics import STATUS
+from .time_metrics import STATUS, names_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -111,14 +112,31 @@ def stored_question(store: str | Path) -> tuple[TimeQuestion, Draw]:
     try:
         case = Case.from_stored(header["case"], source=source)
         recipe = recipe_from(header["controller"])
-        asked = {name: header[name] for name in _QUESTION}
+        asked, drawn = _typed(TimeQuestion, header, _QUESTION), _typed(Draw, header, _DRAW)
+        asked["metrics"] = names_of(asked["metrics"])
         spread = Spread.from_dict(header["spread"], source=source).on(case, recipe.gains)
-        draw = Draw(spread=spread, **{name: header[name] for name in _DRAW})
+        check_range("sweep", "samples", drawn["samples"], low=1, high=10**9)
+        check_range("sweep", "seed", drawn["seed"], low=0)
+        check_range("sweep", "first", drawn["first"], low=0)
+        draw = Draw(spread=spread, **drawn)
         return TimeQuestion(case=case, recipe=recipe, **asked), draw
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{source}: its question is spoilt ({error!r})") from error
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"{source}: its question is spoilt ({what:.120})") from error
+
+
+def _typed(kind: type, header: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
+    """Return fields of a dataclass from a header, of the types that their annotations say.
+
+    Raises ValueError if one is of another; KeyError if it is missing.
+    """
+    hints = get_type_hints(kind)
+    return {
+        name: TypeAdapter(hints[name]).validate_json(json.dumps(header[name]), strict=True)
+        for name in names
+    }
 
 
 class Results:

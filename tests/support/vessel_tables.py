@@ -136,8 +136,11 @@ def orcaflex_text(
     key: str = "RAOPeriodOrFrequency",
     phase_origin: str = "[~, ~, ~]",
     spread_out: bool = False,
+    units: str = "SI",
+    metres: float = 1.0,
+    depth: float | None = None,
 ) -> str:
-    """A vessel type, with the conventions asked for."""
+    """A vessel type, with the conventions asked for; lengths in a unit of so many metres."""
     words = [
         ("forward", "aft"), ("port", "starboard"), ("up", "down"),
         ("down", "up"), ("down", "up"), ("port", "starboard"),
@@ -145,9 +148,11 @@ def orcaflex_text(
     keys = ("SurgePositive", "SwayPositive", "HeavePositive", "RollPositiveStarboard",
             "PitchPositiveBow", "YawPositiveBow")  # fmt: skip
     names = ("Surge", "Sway", "Heave", "Roll", "Pitch", "Yaw")
-    x, y, z = raos.origin
+    x, y, z = (each / metres for each in raos.origin)
     lines = [
-        "%YAML 1.1", "# Type: Model", "---", "General:", "  UnitsSystem: SI", "VesselTypes:",
+        "%YAML 1.1", "# Type: Model", "---", "General:", f"  UnitsSystem: {units}",
+        *([] if depth is None else ["Environment:", f"  WaterDepth: {depth / metres!r}"]),
+        "VesselTypes:",
         "  - Name: swing", "    Length: ~", f"    RAOResponseUnits: {angles}",
         f"    RAOWaveUnit: {wave}", f"    WavesReferredToBy: {waves}",
         f"    RAOPhaseConvention: {sense}", f"    RAOPhaseUnitsConvention: {phases}",
@@ -168,7 +173,7 @@ def orcaflex_text(
                 "frequency (Hz)": omega / (2.0 * math.pi),
             }[waves]
             # Wave slope in deep water, in the unit of the angles, per metre.
-            slope = {"amplitude": 1.0, "max wave slope": omega**2 / 9.80665,
+            slope = {"amplitude": 1.0 / metres, "max wave slope": omega**2 / 9.80665,
                      "wave steepness": omega**2 / 9.80665 / math.pi}[wave]  # fmt: skip
             degrees = math.degrees(1.0) if angles == "degrees" and wave == "amplitude" else 1.0
             cells = [repr(float(first))]
@@ -185,6 +190,80 @@ def orcaflex_text(
             else:
                 lines.append(f"                - [{', '.join(cells)}]")
     lines += ["        LoadRAOs:", "          RAOs: []", "Lines:", "  - Name: Line1", "..."]
+    return "\n".join(lines) + "\n"
+
+
+def aqwa_text(raos: VesselRaos, *, structure: int = 1, version: str = "2023 R1") -> str:
+    """A listing of Aqwa-Line with both tables of RAOs, phases that lag and degrees per metre."""
+    gap = " " * 30
+    x, y, z = raos.origin
+    depth = 1000.0 if math.isinf(raos.depth) else raos.depth
+    lines = [
+        f" Aqwa-Line    - {version}                64BIT VERSION {version}",
+        f"{gap}* * * * G L O B A L   P A R A M E T E R S * * * *",
+        f"{gap}WATER  DEPTH  . . . . . . . . . . . . . . . . = {depth:11.4f}",
+        f"{gap}ACCELERATION  DUE  TO GRAVITY . . . . . . . . =       9.810", "1",
+        f"{gap}* * * * F O R   S T R U C T U R E   {structure} * * * *",
+        f"{gap}STRUCTURE C.O.G.            GX= {x:9.4f}  GY= {y:9.4f}  GZ= {z:9.4f}", "1",
+    ]  # fmt: skip
+    head = [
+        "", " PERIOD   FREQ   DIRECTION   X   Y   Z   RX   RY   RZ", " ------   -----  ---------",
+        " (SECS)  (RAD/S) (DEGREES)    AMP      PHASE    AMP      PHASE", " ---------", "",
+    ]  # fmt: skip
+
+    def row(i: int, j: int, *, omega: bool, heading: bool) -> str:
+        first, degrees = float(raos.omega[i]), float(raos.heading_deg[j])
+        text = f"{2.0 * math.pi / first:8.2f} {first:7.3f}" if omega else " " * 16
+        text += f"{degrees if degrees <= 180.0 else degrees - 360.0:11.2f}" if heading else " " * 11
+        for mode in range(6):
+            value = complex(raos.values[i, j, mode]) * (math.degrees(1.0) if mode > 2 else 1.0)
+            text += f"{abs(value):10.4f}{-math.degrees(cmath.phase(value)):8.2f}"
+        return text
+
+    for kind in ("", "VEL "):
+        every = range(raos.omega.size), range(raos.heading.size)
+        structure_line = f"   P A R A M E T E R S   F O R   S T R U C T U R E   {structure} * * * *"
+        lines += [structure_line, f"{gap}{kind}R.A.O.S-VARIATION WITH WAVE PERIOD/FREQUENCY", *head]
+        for j in every[1]:
+            lines += [row(i, j, omega=True, heading=i == 0) for i in every[0]] + [""]
+        lines += ["1", structure_line, f"{gap}{kind}R.A.O.S-VARIATION WITH WAVE DIRECTION", *head]
+        for i in every[0]:
+            lines += [row(i, j, omega=j == 0, heading=True) for j in every[1]] + [""]
+        lines.append("1")
+    return "\n".join(lines) + "\n"
+
+
+def wamit_listing_text(
+    raos: VesselRaos, *, length: float = 1.0, place: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+) -> str:
+    """A listing of WAMIT: exciting forces, then the motions, phases to a whole degree."""
+    x, y, z, turn = place
+    depth = "infinite" if math.isinf(raos.depth) else f"{raos.depth:.6f}"
+    lines = [
+        f" {'-' * 71}", "                        WAMIT  Version 7.2(x64)        ", "",
+        f" Gravity:     9.81000                Length scale:        {length:.5f}",
+        f" Water depth:        {depth}",
+        f" XBODY = {x:9.4f} YBODY = {y:9.4f} ZBODY = {z:9.4f} PHIBODY = {turn:5.1f}",
+        " Wave period = infinite                                 Wavenumber = zero ",
+        "    ADDED-MASS COEFFICIENTS", "     I     J         A(I,J)", "", "     1     1   1.9E+01",
+    ]  # fmt: skip
+    for i, omega in enumerate(raos.omega):
+        lines.append(
+            f" Wave period (sec) =  {2.0 * math.pi / omega:.6E}        Wavenumber (kL) =  0"
+        )
+        for title, name, factor in (
+            ("DIFFRACTION EXCITING FORCES AND MOMENTS", "Xh", 63.0),
+            ("RESPONSE AMPLITUDE OPERATORS", "RAO", 1.0),
+        ):
+            lines += ["", f"    {title}", ""]
+            for j, degrees in enumerate(raos.heading_deg):
+                head = f"     I     Mod[{name}(I)]     Pha[{name}(I)]"
+                lines += [f"  Wave Heading (deg) :  {degrees:.2f}", "", head, ""]
+                for mode in range(6):
+                    value = complex(raos.values[i, j, mode]) * (length if mode > 2 else 1.0)
+                    phase = math.degrees(cmath.phase(value))
+                    lines.append(f"     {mode + 1}   {factor * abs(value):.6E}   {phase:12.0f}")
+                lines.append("")
     return "\n".join(lines) + "\n"
 
 

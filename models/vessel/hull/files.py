@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics import FloatArray, InputError, check_range, read_bytes
+from ...basics import FloatArray, InputError, binary_name, check_range, read_bytes
 from .hull import Hull, panel_areas
 
 FORMATS = (".stl", ".gdf", ".pnl", ".hst", ".mar")  #: Endings of the files that are read.
@@ -124,8 +124,11 @@ def _by_capytaine(owner: str, data: bytes, kind: str) -> FloatArray:
     from .bem import capytaine, quiet
 
     cpt = capytaine()
-    if b"\x00" in data:
-        raise InputError(f"{owner}: this is a binary file, not the text that was expected")
+    name = binary_name(data)
+    if name or b"\x00" in data:
+        raise InputError(
+            f"{owner}: this is no text, as was expected, but {name or 'a binary file'}"
+        )
     text = StringIO(data.decode("utf-8", "replace"))
     try:
         with quiet(), warnings.catch_warnings():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .files import bundled_vessels, read_raos, write_raos
+    from .files import ENDINGS, bundled_vessels, read_raos, write_raos
     from .long_waves import LongWaveCheck, check_long_waves
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -11,10 +11,13 @@ line for each frequency and heading, in any order:
     25.0, 180, 0.985, -2.1, 0.01, 3.0, ...
 
 The keys are those of :class:`models.vessel.convention.Convention`, and `name`, `origin`,
-`phase_origin`, `depth`, `speed`, `symmetry`, `source` and `note`; what is not told is the
-project's own convention.  The first column is `omega` [rad/s], `frequency` [Hz] or `period` [s],
-the second `heading` [deg]; a motion is `_amplitude` and `_phase` [deg], or `_real` and `_imag`.
-Motions without columns are zero; heave must be there.
+`phase_origin`, `depth`, `speed`, `heading`, `symmetry`, `source` and `note`; what is not told is
+the project's own convention.  There is a column `omega` [rad/s], `frequency` [Hz] or `period` [s],
+and `heading` [deg] unless the table is of one that is told; a motion is `_amplitude` and `_phase`
+[deg], or `_real` and `_imag`.  Motions without columns are zero; heave must be there.
+
+Columns are also found by what people call them, `Heave amp (m/m)`, `Wave direction (deg)`, in any
+order; behind semicolons and tabs a comma is the decimal point.
 """
 
 import csv
@@ -34,14 +37,29 @@ from ..symmetry import SYMMETRIES
 FORMAT = "Stillhook RAOs, version 1"
 
 Columns = dict[str, tuple[int, str]]  # number and unit of the column of each "mode part"
-Header = tuple[str, str, Columns]  # kind of the first column, unit of the headings, the rest
+Named = tuple[int, str]  # number of a column, and what its numbers are
+Header = tuple[Named, Named | None, Columns]  # waves, headings in degrees or radians, the rest
 
-_ABOUT = ("name", "origin", "phase_origin", "depth", "speed", "symmetry", "source", "note")
+_ABOUT = (
+    "name", "origin", "phase_origin", "depth", "speed", "heading", "symmetry", "source", "note"
+)  # fmt: skip
 _KEY = re.compile(r"^#\s*([A-Za-z_ ]+?)\s*:\s*(.*?)\s*$")
-_COLUMN = re.compile(r"^([a-z_ ]+?)\s*(?:[\[(]\s*(.*?)\s*[\])])?$")
-_FIRST = {"omega": "frequency (rad/s)", "frequency": "frequency (Hz)", "period": "period (s)"}
+_COLUMN = re.compile(r"^([a-z_ .-]+?)\s*(?:[\[(]\s*(.*?)\s*[\])])?$")
+_FIRST = {
+    **dict.fromkeys(("omega", "w"), "frequency (rad/s)"),
+    **dict.fromkeys(("frequency", "freq", "wave_frequency", "wave_freq"), "frequency (Hz)"),
+    **dict.fromkeys(("period", "t", "wave_period"), "period (s)"),
+}
+_HEADING = ("heading", "direction", "dir", "beta", "wave_heading", "wave_direction", "wave_dir")
 _FIRST_UNITS = {"rad/s": "frequency (rad/s)", "hz": "frequency (Hz)", "s": "period (s)"}
-_PARTS = {"amplitude": 0, "amp": 0, "phase": 1, "real": 2, "re": 2, "imag": 3, "im": 3}
+_PARTS = {
+    **dict.fromkeys(("amplitude", "amp", "ampl", "magnitude", "mag", "rao"), 0),
+    **dict.fromkeys(("phase", "ph", "pha"), 1),
+    **dict.fromkeys(("real", "re"), 2),
+    **dict.fromkeys(("imag", "im"), 3),
+}
+#: Names of columns that will do, for messages.
+WOULD_DO = "'Period (s)', 'Heading (deg)', 'Heave amp (m/m)', 'Heave phase (deg)'"
 _NAMES = ("amplitude", "phase", "real", "imag")
 _TURN_UNITS = {"deg": "degrees", "rad": "radians", "degrees": "degrees", "radians": "radians"}
 _ANGLES = {"deg/m": "deg/m", "rad/m": "rad/m", "": ""}
@@ -51,35 +69,34 @@ def looks_like_csv(text: str) -> bool:
     """Say whether the first line that is no remark names a heading and a motion."""
     for line in text.splitlines()[:200]:
         if line.strip() and not line.lstrip().startswith("#"):
-            words = line.lower()
-            return "heading" in words and any(f"{mode}_" in words for mode in MODES)
+            if line.lower().startswith("sep="):  # Excel's
+                continue
+            words = [_plain(cell)[0] for cell in re.split(r"[,;\t]", line)]
+            waves = any(word in _FIRST for word in words)
+            return len(words) > 1 and waves and any(_motion(word) for word in words)
     return False
 
 
-def parse_csv(owner: str, text: str) -> VesselRaos:
-    """Return the table of a CSV file.
+def parse_csv(owner: str, text: str, *, heading: float | None = None) -> VesselRaos:
+    """Return the table of a CSV file; arguments are those of `read_raos`.
 
     Raises InputError if a key or a column is unknown, a line has another number of columns than the
-    header, a word is no number, or rows are missing.
+    header, a word is no number, rows are missing, or there is no column of headings and none told.
     """
     told, notes, body, start = _head(owner, text)
-    (first, turn, columns), rows = _rows(owner, body, start)
+    ((at, first), turn, columns), rows = _rows(owner, body, start)
     convention = _convention(owner, told, first, columns)
     depth = _figure(owner, "depth", told, math.inf)
-    low, high = float(rows[:, 0].min()), float(rows[:, 0].max())
+    low, high = float(rows[:, at].min()), float(rows[:, at].max())
     if not (low > 1e-6 and high < 1e6):
-        raise InputError(
-            f"{owner}: {first} must be in (1e-6, 1e6), got {low:g} to {high:g} in the first column"
-        )
-    omega = convention.omega(rows[:, 0])
-    heading = np.degrees(rows[:, 1]) if turn == "radians" else rows[:, 1]
-    if np.any(np.abs(heading) > 720.0):
-        raise InputError(f"{owner}: heading must be in [-720, 720] deg, got {heading.max():g} deg")
+        raise InputError(f"{owner}: {first} must be in (1e-6, 1e6), got {low:g} to {high:g}")
+    omega = convention.omega(rows[:, at])
+    headings = _headings(owner, rows, turn, told, heading)
     slope = wave_number(omega, depth)
     values, missing = _values(owner, rows, columns, convention, slope)
     origin = _point(owner, "origin", told, (0.0, 0.0, 0.0))
     zero = _point(owner, "phase_origin", told, origin[:2])
-    w, b, table = grid(owner, omega, convention.directions(heading), values)
+    w, b, table = grid(owner, omega, convention.directions(headings), values)
     found = [f"CSV: {convention.words()}"]
     if missing:
         found.append(f"no columns for {', '.join(missing)}: taken as zero")
@@ -95,6 +112,29 @@ def parse_csv(owner: str, text: str) -> VesselRaos:
     )
     # What we wrote ourselves is whole; only a file from elsewhere may be one side of a ship.
     return raos if own and symmetry is None else finished(raos, symmetry=symmetry)
+
+
+def _headings(
+    owner: str, rows: FloatArray, turn: Named | None, told: Mapping[str, str], given: float | None
+) -> FloatArray:
+    """Return the heading of each row (n,) [deg]: of its column, or the one that is told."""
+    if turn is not None:
+        if given is not None:
+            raise InputError(f"{owner}: heading must not be given: the file has a column of them")
+        found = rows[:, turn[0]]
+        found = np.degrees(found) if turn[1] == "radians" else found
+    elif given is not None or "heading" in told:
+        one = told["heading"] if given is None else given
+        found = np.full(len(rows), check_range(owner, "heading", one, unit="deg"))
+    else:
+        raise InputError(
+            f"{owner}: there is no column of headings ('Heading (deg)'); say for which heading the "
+            "table holds: heading=180, --heading 180, or a line '# heading: 180'"
+        )
+    if np.any(np.abs(found) > 720.0):
+        worst = found[int(np.argmax(np.abs(found)))]
+        raise InputError(f"{owner}: heading must be in [-720, 720] deg, got {worst:g} deg")
+    return np.asarray(found, dtype=np.float64)
 
 
 def csv_text(raos: VesselRaos) -> str:
@@ -135,7 +175,7 @@ def _head(owner: str, text: str) -> tuple[dict[str, str], list[str], list[str], 
     start = 0
     for number, line in enumerate(lines, start=1):
         bare = line.strip()
-        if not bare:
+        if not bare or bare.lower().startswith("sep="):
             continue
         if not bare.startswith("#"):
             body, start = lines[number - 1 :], number
@@ -176,44 +216,56 @@ def _rows(owner: str, lines: list[str], start: int) -> tuple[Header, FloatArray]
                 f"{owner}, line {number}: must have {width} columns as the header has, got "
                 f"{len(row)}; is the file cut off?"
             )
-        found.append(numbers(owner, number, [cell.strip() for cell in row]))
+        cells = [cell.strip() if mark == "," else cell.strip().replace(",", ".") for cell in row]
+        found.append(numbers(owner, number, cells))
     if not found:
         raise InputError(f"{owner}: there is no row of RAOs below the column names")
     return header, np.array(found, dtype=np.float64)
 
 
+def _plain(name: str) -> tuple[str, str]:
+    """Return the words of a column's name, joined by `_`, and its unit."""
+    match = _COLUMN.match(" ".join(name.strip().strip('"').lower().split()))
+    if match is None:
+        return "", ""
+    unit = (match[2] or "").replace("\N{DEGREE SIGN}", "deg")
+    return re.sub(r"[ ._-]+", "_", match[1]).strip("_"), unit
+
+
+def _motion(word: str) -> str:
+    """Return the `mode part` that a column is of, or nothing."""
+    mode, _, part = word.rpartition("_")
+    if part in MODES:  # as in `amp heave`
+        mode, part = part, mode
+    return f"{mode} {_NAMES[_PARTS[part]]}" if mode in MODES and part in _PARTS else ""
+
+
 def _header(owner: str, names: list[str]) -> Header:
-    """Return what the first column is, the unit of the second, and where each `mode part` is."""
-    first = turn = ""
+    """Return which column has the waves, which the headings, and where each `mode part` is."""
+    waves: Named | None = None
+    turn: Named | None = None
     columns: Columns = {}
     for index, name in enumerate(names):
-        match = _COLUMN.match(name.lower())
-        word, unit = (match[1], (match[2] or "").lower()) if match else ("", "")
-        if index == 0:
-            if word not in _FIRST or (unit and unit not in _FIRST_UNITS):
-                raise InputError(
-                    f"{owner}: the first column must be omega [rad/s], frequency [Hz] or period "
-                    f"[s], got {name!r}"
-                )
-            first = _FIRST_UNITS[unit] if unit else _FIRST[word]
-        elif index == 1:
-            if word != "heading" or (unit and unit not in _TURN_UNITS):
-                raise InputError(
-                    f"{owner}: the second column must be heading [deg] or [rad], got {name!r}"
-                )
-            turn = _TURN_UNITS[unit] if unit else "degrees"
-        else:
-            mode, _, part = word.rpartition("_")
-            key = f"{mode} {_NAMES[_PARTS[part]]}" if mode in MODES and part in _PARTS else ""
-            if not key or key in columns:
-                raise InputError(
-                    f"{owner}: a column must be a motion ({', '.join(MODES)}) with _amplitude, "
-                    f"_phase, _real or _imag, each once; got {name!r}"
-                )
+        word, unit = _plain(name)
+        key = _motion(word)
+        if word in _FIRST and waves is None and (not unit or unit in _FIRST_UNITS):
+            waves = index, _FIRST_UNITS[unit] if unit else _FIRST[word]
+        elif word in _HEADING and turn is None and (not unit or unit in _TURN_UNITS):
+            turn = index, _TURN_UNITS[unit] if unit else "degrees"
+        elif key and key not in columns:
             columns[key] = (index, unit)
-    if not turn:
-        raise InputError(f"{owner}: there must be a second column, heading [deg]")
-    return first, turn, columns
+        else:
+            raise InputError(
+                f"{owner}: a column must be omega [rad/s], frequency [Hz] or period [s], heading "
+                f"[deg] or [rad], or a motion ({', '.join(MODES)}) with _amplitude, _phase, _real "
+                f"or _imag, each once; got {name!r}. Names such as {WOULD_DO} will do"
+            )
+    if waves is None:
+        raise InputError(
+            f"{owner}: there must be a column omega [rad/s], frequency [Hz] or period [s]; names "
+            f"such as {WOULD_DO} will do"
+        )
+    return waves, turn, columns
 
 
 def _convention(owner: str, told: Mapping[str, str], first: str, columns: Columns) -> Convention:

@@ -8,6 +8,7 @@ is still one.  Whatever a reader trips over comes out as an
 and is caught here, once for all of them.
 """
 
+import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from ...basics import (
     InputError,
     PhysicsWarning,
     StillhookError,
+    binary_name,
     check_finite,
     check_hdf5,
     read_bytes,
@@ -31,14 +33,16 @@ from ..assemble import finished, text_of
 from ..convention import one_of
 from ..raos import VesselRaos
 from ..symmetry import SYMMETRIES
+from .aqwa import looks_like_aqwa, parse_aqwa
 from .capytaine_file import parse_capytaine
-from .csv_file import csv_text, looks_like_csv, parse_csv
+from .csv_file import WOULD_DO, csv_text, looks_like_csv, parse_csv
 from .long_waves import check_long_waves
 from .mss import parse_mss
 from .netcdf_file import is_ours, parse_netcdf, write_netcdf
-from .orcaflex import looks_like_orcaflex, parse_orcaflex
+from .orcaflex import looks_like_orcaflex, orcaflex_text, parse_orcaflex
 from .shipx import looks_like_shipx, parse_shipx
-from .wamit import looks_like_wamit, parse_wamit
+from .wamit import looks_like_wamit, parse_wamit, wamit_text
+from .wamit_listing import looks_like_wamit_listing, parse_wamit_listing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,12 +78,23 @@ FORMATS: Mapping[str, Reader] = {
         text=False,
     ),
     "shipx": Reader(about="ShipX/Veres .re1", parse=parse_shipx),
+    "aqwa": Reader(about="listing of AQWA (.LIS)", parse=parse_aqwa),
+    "wamit-listing": Reader(about="listing of WAMIT (.out)", parse=parse_wamit_listing),
 }
 """The formats that are read."""
+
+_TEXTS: Mapping[str, Callable[[VesselRaos], str]] = {
+    ".csv": csv_text,
+    ".4": wamit_text,
+    ".yml": orcaflex_text,
+}
+ENDINGS = (*_TEXTS, ".nc")
+"""Endings of the files that are written."""
 
 _BUNDLED = {"osv-83m": "offshore support vessel, 83 m, from our own hull lines by Capytaine"}
 _HDF5 = b"\x89HDF"
 _LARGEST = 1e4  # m/m or rad/m: no vessel moves so
+_LARGEST_HEAVE = 50.0  # m/m: what a case may have; forces taken for motions are larger
 
 
 def read_raos(
@@ -108,7 +123,7 @@ def read_raos(
 
         - speed: which forward speed of the file [m/s], the lowest if left out (MSS, ShipX,
           Capytaine).
-        - body: which body of the file (WAMIT: a number from 1; Capytaine: a name).
+        - body: which body of the file (WAMIT, AQWA: a number from 1; Capytaine: a name).
         - length: WAMIT's ULEN [m], 1 m if left out.
         - depth: water depth [m], where the file does not tell (WAMIT, OrcaFlex) or has several
           (Capytaine).
@@ -118,6 +133,8 @@ def read_raos(
         - roll_damping: damping of roll to add, over the critical [-] (Capytaine).
         - inertia, stiffness: mass and hydrostatic stiffness (6, 6), where a Capytaine file has
           none.
+        - heading: the one heading of the file [deg], in its own convention, where it has no column
+          of them (CSV).
         - waves: whether the first column of a WAMIT file is the `period` or the `frequency`; if
           left out, the heave of long waves tells.
 
@@ -135,7 +152,8 @@ def read_raos(
     Warns
     -----
     PhysicsWarning
-        If the motions in long waves are not those of a free-floating vessel, unexplained.
+        If the motions in long waves are not those of a free-floating vessel, unexplained, or the
+        table has no waves that are long.
     """
     place = _place(path)
     owner = str(path)
@@ -169,20 +187,32 @@ def read_raos(
         raise InputError(
             f"{owner}: RAOs must be at most {_LARGEST:g} m/m or rad/m, got {largest:.3g}"
         )
+    heave = float(np.abs(raos.mode("heave")).max())
+    if check and heave > _LARGEST_HEAVE:
+        raise InputError(
+            f"{owner}: heave must be at most {_LARGEST_HEAVE:g} m/m, got {heave:.3g} m/m: are "
+            "these forces, no motions? If it is right as it is, read it without the check "
+            "(check=False, --no-check)"
+        )
     return _checked(owner, raos) if check else raos
 
 
 def write_raos(path: str | Path, raos: VesselRaos) -> Path:
-    """Write a table as the project's CSV (.csv) or NetCDF (.nc); both read back exactly.
+    """Write a table as the project's CSV (.csv) or NetCDF (.nc), for WAMIT (.4) or OrcaFlex (.yml).
 
-    Raises InputError if the name ends otherwise, or the file cannot be written.
+    The project's own read back exactly, the others to twelve digits and without notes; a WAMIT file
+    has no place for origin and water depth.
+
+    Raises InputError if the name ends otherwise, the file cannot be written, or the vessel moves
+    forward and the format has no speed.
     """
     place = Path(path)
-    if place.suffix.lower() == ".csv":
-        return write_text_atomically(place, csv_text(raos))
-    if place.suffix.lower() == ".nc":
+    ending = place.suffix.lower()
+    if ending == ".nc":
         return write_netcdf(place, raos)
-    raise InputError(f"{place}: the name of a RAO file must end in .csv or .nc")
+    if ending not in _TEXTS:
+        raise InputError(f"{place}: the name of a RAO file must end in {', '.join(ENDINGS)}")
+    return write_text_atomically(place, _TEXTS[ending](raos))
 
 
 def bundled_vessels() -> tuple[tuple[str, str], ...]:
@@ -203,13 +233,15 @@ def file_format_of(owner: str, data: bytes) -> str:
     if head.startswith(b"MATLAB"):
         return "mss"
     known = ", ".join(FORMATS)
-    if b"\x00" in data:
-        raise InputError(
-            f"{owner}: this is a binary file of no kind that is known here (formats: {known})"
-        )
+    name = binary_name(data)
+    if name or b"\x00" in data:
+        what = name or "a binary file of no kind that is known here"
+        raise InputError(f"{owner}: this is no RAO file, but {what} (formats: {known})")
     text = text_of(owner, data)
     # From the most to the least telling: a WAMIT file is bare numbers, as others' tables are.
     looks = {
+        "aqwa": looks_like_aqwa,
+        "wamit-listing": looks_like_wamit_listing,
         "orcaflex": looks_like_orcaflex,
         "csv": looks_like_csv,
         "shipx": looks_like_shipx,
@@ -220,8 +252,8 @@ def file_format_of(owner: str, data: bytes) -> str:
             return kind
     first = text.strip()[:40]
     raise InputError(
-        f"{owner}: this is no RAO file of a kind that is known here (formats: {known}); it begins "
-        f"with {first!r}"
+        f"{owner}: this is no RAO file of a kind that is known here (formats: {known}; a table has "
+        f"columns such as {WOULD_DO}); it begins with {first!r}"
     )
 
 
@@ -258,7 +290,7 @@ def _checked(owner: str, raos: VesselRaos) -> VesselRaos:
             f"{_complex(worst.expected)} is expected; if it is right as it is, read it without the "
             "check (check=False, --no-check)"
         )
-    if found.remarks and not found.ok and found.long:
+    if found.remarks and not found.ok:
         warnings.warn(f"{owner}: {found.remarks[0]}", PhysicsWarning, stacklevel=3)
     return replace(raos, notes=(*raos.notes, *(f"check: {text}" for text in found.remarks)))
 
@@ -273,7 +305,7 @@ def _complex(value: complex) -> str:
 def _place(path: str | Path) -> Path:
     """Return the file of a path, or of the name of a bundled vessel."""
     name, place = str(path), Path(path)
-    there = "\x00" in name or bool(place.suffix) or place.exists()
+    there = "\x00" in name or bool(place.suffix) or os.path.exists(place)
     if name in _BUNDLED and not there:
         return Path(str(resources("models.vessel"))) / "data" / f"{name}.csv"
     if not there:

@@ -110,8 +110,8 @@ class LongWaveCheck:
 
     @property
     def ok(self) -> bool:
-        """Whether the table keeps the limits."""
-        return self.error <= _DOUBTFUL and not self.mistake
+        """Whether the table has long waves, and keeps their limits."""
+        return self.long and self.error <= _DOUBTFUL and not self.mistake
 
 
 def check_long_waves(raos: VesselRaos) -> LongWaveCheck:

@@ -10,6 +10,7 @@ Unused speeds are columns of zeros: MSS keeps room for ten.
 """
 
 import io
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,9 @@ MSS = Convention(
     turning="clockwise",
 )
 """What the numbers of an MSS vessel mean."""
+
+
+_NO_NAMES = ("", "input", "vessel")  # what `veres2vessel` makes of the run's file `input.re1`
 
 
 def parse_mss(
@@ -73,7 +77,7 @@ def parse_mss(
     ]
     return finished(
         VesselRaos(
-            name=_name(vessel), omega=rows[0], heading=rows[1], values=rows[2],
+            name=_name(owner, vessel), omega=rows[0], heading=rows[1], values=rows[2],
             origin=origin, phase_origin=origin[:2], speed=chosen, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip
@@ -138,6 +142,8 @@ def _modes(owner: str, rao: Any, name: str, k: int, h: int, v: int) -> FloatArra
     return np.stack(found, axis=-1)
 
 
-def _name(vessel: Any) -> str:
+def _name(owner: str, vessel: Any) -> str:
+    """Return what the vessel is called: after the file where MSS calls it as it does every one."""
     name = getattr(getattr(vessel, "main", None), "name", "")
-    return name.strip() if isinstance(name, str) and name.strip() else "vessel"
+    own = name.strip() if isinstance(name, str) else ""
+    return Path(owner).stem if own.lower() in _NO_NAMES else own

@@ -9,25 +9,39 @@ up, whatever the positive directions are; directions are where the waves travel 
 OrcaFlex help, *Vessel types: Conventions* and *RAOs*).  Slope and steepness go by the wave length
 in deep water, as OrcaFlex itself does.
 
+Of the units only that of length matters to motions: rotations are per length of wave, points and
+water depth are lengths.  `UnitsSystem` SI has metres, US feet, User what `LengthUnits` says.
+
 Older versions write `RAOPeriodOrFreq` where newer ones write `RAOPeriodOrFrequency`.
 """
 
+import cmath
+import json
 import math
 import re
 from typing import Any
 
 import numpy as np
 
-from ...basics import ComplexArray, FloatArray, InputError, check_finite, check_range, wave_number
+from ...basics import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    check_finite,
+    check_range,
+    read_quantity,
+    wave_number,
+)
 from ..assemble import finished, grid
 from ..convention import Convention, one_of
-from ..raos import VesselRaos
+from ..raos import MODES, VesselRaos
 from ..symmetry import SYMMETRIES
+from .wamit import at_rest
 
 Entry = dict[str, Any]
 
 _SECTION = "DisplacementRAOs"
-_UNITS = re.compile(r"^[ ]*UnitsSystem:[ ]*(\S+)", re.MULTILINE)
+_TOLD = r"^[ ]*{key}:[ ]*([^\s#]+)"  # a key of the model, above its vessel types
 _PERIODS = (1e-6, 1e6)
 _TABLE_KEYS = ("RAOPeriodOrFrequency", "RAOPeriodOrFreq")
 """How the heading of a RAO table begins, in newer and in older versions."""
@@ -54,7 +68,7 @@ def parse_orcaflex(
     *,
     vessel_type: str | None = None,
     draught: str | None = None,
-    depth: float = math.inf,
+    depth: float | None = None,
 ) -> VesselRaos:
     """Return the motions at one draught of one vessel type.
 
@@ -63,24 +77,27 @@ def parse_orcaflex(
     Raises InputError if the file is something else, cut off, lacks a convention or knows one that
     OrcaFlex does not have, or the vessel type, the draught or its RAOs are not there.
     """
-    units = _UNITS.search(text)
-    if units is not None and units[1] != "SI":
-        raise InputError(
-            f"{owner}: UnitsSystem must be SI, got {units[1]!r}: set it in OrcaFlex and save again"
-        )
+    unit, metres = _length_unit(owner, text)
     types, tables = _vessel_types(owner, text)
     found = _candidates(owner, types, vessel_type, draught)
     vessel, state, block = found[0]
     convention = _convention(owner, vessel)
     omega, heading, values = _table(owner, block, tables, convention)
-    origin = _point(owner, f"{_SECTION}.RAOOrigin", block.get("RAOOrigin"), (0.0, 0.0, 0.0))
-    zero = _point(owner, f"{_SECTION}.PhaseOrigin", block.get("PhaseOrigin"), origin)
+    if convention.rotations in ("rad/m", "deg/m"):
+        values[:, :, 3:] /= metres
+    middle = (0.0, 0.0, 0.0)
+    origin = _point(owner, f"{_SECTION}.RAOOrigin", block.get("RAOOrigin"), middle, metres)
+    zero = _point(owner, f"{_SECTION}.PhaseOrigin", block.get("PhaseOrigin"), origin, metres)
     symmetry = one_of(owner, "Symmetry", vessel.get("Symmetry", "None"), SYMMETRIES)
     title = str(vessel.get("Name", "vessel"))
     notes = [
         f"OrcaFlex vessel type {title!r}, draught {state.get('Name', '1')!r}",
         f"conventions of the file: {convention.words()}",
     ]
+    if metres != 1.0:
+        notes.append(f"lengths of the file are in {unit}: converted")
+    if depth is None:
+        depth = _water_depth(owner, text, metres)
     if len(found) > 1:
         rest = ", ".join(f"{v.get('Name')!r} {d.get('Name')!r}" for v, d, _ in found[1:4])
         notes.append(f"other RAOs in the file: {rest}{', ..' if len(found) > 4 else ''}")
@@ -89,6 +106,73 @@ def parse_orcaflex(
         phase_origin=zero[:2], depth=depth, source=owner, notes=tuple(notes),
     )  # fmt: skip
     return finished(raos, symmetry=symmetry)
+
+
+def orcaflex_text(raos: VesselRaos) -> str:
+    """Return a table as an OrcaFlex text file with one vessel type, in SI units.
+
+    Raises InputError if the vessel moves forward.
+    """
+    found = at_rest(raos, "an OrcaFlex file")
+    name, own = json.dumps(raos.name), Convention()
+    origin = ", ".join(repr(each) for each in raos.origin)
+    zero = ", ".join(repr(each) for each in (*raos.phase_origin, raos.origin[2]))
+    depth = [] if math.isinf(raos.depth) else ["Environment:", f"  WaterDepth: {raos.depth!r}"]
+    lines = [
+        "%YAML 1.1", "---", "General:", "  UnitsSystem: SI", *depth, "VesselTypes:",
+        f"  - Name: {name}", "    RAOResponseUnits: radians", "    RAOWaveUnit: amplitude",
+        f"    WavesReferredToBy: {own.waves}", f"    RAOPhaseConvention: {own.phase}",
+        f"    RAOPhaseUnitsConvention: {own.phase_unit}",
+        f"    RAOPhaseRelativeToConvention: {own.phase_relative_to}",
+        f"    SurgePositive: {own.surge}", f"    SwayPositive: {own.sway}",
+        f"    HeavePositive: {own.heave}",
+        f"    RollPositiveStarboard: {own.roll.rpartition(' ')[2]}",
+        f"    PitchPositiveBow: {own.pitch.rpartition(' ')[2]}",
+        f"    YawPositiveBow: {own.yaw.rpartition(' ')[2]}", "    Symmetry: None",
+        "    Draughts:", "      - Name: Draught1", f"        {_SECTION}:",
+        f"          RAOOrigin: [{origin}]", f"          PhaseOrigin: [{zero}]", "          RAOs:",
+    ]  # fmt: skip
+    parts = (f"RAO{mode.capitalize()}{part}" for mode in MODES for part in ("Amp", "Phase"))
+    head = ", ".join([_TABLE_KEYS[0], *parts])
+    for j, degrees in enumerate(found.heading_deg):
+        lines += [f"            - RAODirection: {float(degrees)!r}", f"              {head}:"]
+        for i, omega in enumerate(found.omega):
+            cells = [float(omega)]
+            for value in found.values[i, j]:
+                cells += [abs(value), math.degrees(cmath.phase(value))]
+            row = ", ".join(repr(float(cell)) for cell in cells)
+            lines.append(f"                - [{row}]")
+    return "\n".join(lines) + "\n"
+
+
+def _told(text: str, key: str) -> str | None:
+    """Return what the model says under a key that it has once, if it does."""
+    found = re.search(_TOLD.format(key=key), text, re.MULTILINE)
+    return found[1] if found else None
+
+
+def _length_unit(owner: str, text: str) -> tuple[str, float]:
+    """Return the unit of length of a file, and its size [m]."""
+    system = _told(text, "UnitsSystem") or "SI"
+    if system not in {"SI", "US", "User"}:
+        raise InputError(f"{owner}: UnitsSystem must be one of SI, US, User; got {system!r}")
+    unit = {"SI": "m", "US": "ft"}.get(system) or _told(text, "LengthUnits")
+    if unit is None:
+        raise InputError(f"{owner}: LengthUnits is missing, which UnitsSystem User asks for")
+    try:
+        return unit, float(read_quantity(f"1 {unit}", "length"))
+    except InputError:
+        raise InputError(
+            f"{owner}: LengthUnits must be a length such as m, km, ft; got {unit!r}"
+        ) from None
+
+
+def _water_depth(owner: str, text: str, metres: float) -> float:
+    """Return the water depth that the model has [m], infinite where it tells of none."""
+    told = _told(text, "WaterDepth")
+    if told is None or told == "~":
+        return math.inf
+    return metres * check_range(owner, "WaterDepth", told, low=0.0, open_low=True)
 
 
 def _candidates(
@@ -195,15 +279,17 @@ def _table(
 
 
 def _point(
-    owner: str, name: str, value: object, default: tuple[float, float, float]
+    owner: str, name: str, value: object, default: tuple[float, float, float], metres: float
 ) -> tuple[float, float, float]:
-    """Return a point of the vessel [m]; `~`, YAML's nothing, stands for the default."""
+    """Return a point of the vessel [m] told in a unit of so many metres; `~` is the default [m]."""
     if value is None:
         return default
     if not isinstance(value, list) or len(value) != 3:
-        raise InputError(f"{owner}: {name} must be 3 numbers [m], got {value!r}")
-    filled = [d if v is None or v == "~" else v for v, d in zip(value, default, strict=True)]
-    x, y, z = check_finite(owner, name, filled)
+        raise InputError(f"{owner}: {name} must be 3 numbers, got {value!r}")
+    filled = [
+        d / metres if v is None or v == "~" else v for v, d in zip(value, default, strict=True)
+    ]
+    x, y, z = metres * check_finite(owner, name, filled)
     if max(abs(x), abs(y), abs(z)) > 1e4:
         raise InputError(f"{owner}: {name} must be within 10 km, got {value!r}")
     return float(x), float(y), float(z)

@@ -12,9 +12,14 @@ number.  WAMIT Inc., user manual 7.4, sections 3.4 and 4.9:
 * PER = 0 and PER < 0 stand for the limits of zero and infinite period: no rows of a sea.
 
 Each line says everything twice, which tells a file that was cut, shuffled or edited.
+
+The exciting forces, `.2` and `.3`, have the same lines.  They are refused by their name, by the
+name in their first line, and by a heave that is near 1 at neither end of the first column.
 """
 
+import cmath
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +31,9 @@ from ..convention import Convention, one_of
 from ..raos import VesselRaos
 
 _COLUMNS = 7
+_FORCES = {".2": "exciting forces by Haskind's relation", ".3": "exciting forces"}
+_NAMED = re.compile(r"Filename\s+(\S+)")  # in the header that NUMHDR = 1 writes
+_NEAR = 0.3  # of 1: heave at the end of a column that is that of the longest waves
 _MISMATCH = 2e-3  # of the amplitude, between its two forms on a line: six digits are printed
 
 
@@ -62,6 +70,7 @@ def parse_wamit(
     Raises InputError if a line is no line of a `.4` file or contradicts itself, rows are missing,
     or the body is not there.
     """
+    _refuse_forces(owner, text)
     rows = _rows(owner, text)
     notes = ["WAMIT .4: time factor e^{+i omega t}, z up, headings towards: as here"]
     limits = rows[:, 0] <= 0.0
@@ -70,7 +79,7 @@ def parse_wamit(
         rows = rows[~limits]
     if not rows.size:
         raise InputError(f"{owner}: there is no row of a finite period above 0 s in this file")
-    rows = _of_body(owner, rows, body, notes)
+    rows = of_body(owner, rows, body, notes)
     scale = 1.0 if length is None else check_range(owner, "length", length, low=0.0, open_low=True)
     if length is None:
         notes.append("angles read as rad/m: ULEN taken as 1 m (length=.. if the run had another)")
@@ -78,7 +87,9 @@ def parse_wamit(
         notes.append(f"angles divided by ULEN = {length:g} m")
     kinds = {"period": "period (s)", "frequency": "frequency (rad/s)"}
     kind = (
-        _column_kind(rows) if waves is None else kinds[one_of(owner, "waves", waves, tuple(kinds))]
+        _column_kind(owner, rows)
+        if waves is None
+        else kinds[one_of(owner, "waves", waves, tuple(kinds))]
     )
     notes.append(f"first column read as {kind}" + ("" if waves else ", by the heave of long waves"))
     convention = Convention(waves=kind)
@@ -91,7 +102,9 @@ def parse_wamit(
             f"{owner}: the first column must be in (1e-6, 1e6) s or rad/s, got {first:g} to "
             f"{last:g}"
         )
-    omega, heading, table = _six(owner, convention.omega(rows[:, 0]), rows[:, 1], modes, scaled)
+    omega, heading, table = six_modes(
+        owner, convention.omega(rows[:, 0]), rows[:, 1], modes, scaled
+    )
     motions = convention.complex_values(table, wave_number(omega, depth))
     w, b, found = grid(owner, omega, convention.directions(heading), motions)
     return finished(
@@ -100,6 +113,49 @@ def parse_wamit(
             phase_origin=origin[:2], depth=depth, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip
+
+
+def wamit_text(raos: VesselRaos) -> str:
+    """Return a table as the text of a `.4` file of periods, ULEN 1 m.
+
+    The file has no place for origin, water depth and forward speed: who reads it tells the former.
+
+    Raises InputError if the vessel moves forward.
+    """
+    found = at_rest(raos, "a WAMIT file").with_phase_origin(raos.origin[:2])
+    lines = [" Stillhook: PER BETA I MOD PHA RE IM"]
+    for i, omega in enumerate(found.omega):
+        for j, degrees in enumerate(found.heading_deg):
+            for mode, value in enumerate(found.values[i, j], start=1):
+                cells = (
+                    abs(value), math.degrees(cmath.phase(value)), value.real, value.imag
+                )  # fmt: skip
+                first = f"{2.0 * math.pi / omega:.12E} {degrees:.9E} {mode:5d}"
+                lines.append(f" {first} {' '.join(f'{cell:.12E}' for cell in cells)}")
+    return "\n".join(lines) + "\n"
+
+
+def at_rest(raos: VesselRaos, what: str) -> VesselRaos:
+    """Return a table that a format without forward speed can hold.
+
+    Raises InputError if it holds at one.
+    """
+    if raos.speed != 0.0:
+        raise InputError(f"{raos.name}: {what} has no forward speed, got {raos.speed:g} m/s")
+    return raos
+
+
+def _refuse_forces(owner: str, text: str) -> None:
+    """Raise InputError if the file's name, or the name in its first line, is one of forces."""
+    named = _NAMED.search(text.partition("\n")[0])
+    for name in (owner, named[1] if named else ""):
+        what = _FORCES.get(Path(name).suffix)
+        if what:
+            inside = "" if name == owner else f" is called {name!r} inside:"
+            raise InputError(
+                f"{owner}:{inside} WAMIT writes {what} to a {Path(name).suffix} file, in the same "
+                "columns as motions, which are in the .4 file of the same run"
+            )
 
 
 def _rows(owner: str, text: str) -> FloatArray:
@@ -145,7 +201,7 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _of_body(owner: str, rows: FloatArray, body: int | None, notes: list[str]) -> FloatArray:
+def of_body(owner: str, rows: FloatArray, body: int | None, notes: list[str]) -> FloatArray:
     """Return the rows of one body, its modes counted from 1."""
     modes = rows[:, 2].astype(int)
     bodies = sorted(set(((modes - 1) // 6 + 1).tolist()))
@@ -160,25 +216,38 @@ def _of_body(owner: str, rows: FloatArray, body: int | None, notes: list[str]) -
         raise InputError(
             f"{owner}: body must be one of {', '.join(map(str, bodies))}, got {body!r}"
         )
-    if len(bodies) > 1:
-        notes.append(f"body {body} of {len(bodies)}: modes {6 * body - 5} to {6 * body}")
+    if bodies != [1]:
+        rest = [str(other) for other in bodies if other != body]
+        left = f"; left out: body {' and '.join(rest)}" if rest else ", the only ones in the file"
+        notes.append(f"body {body}: modes {6 * body - 5} to {6 * body}{left}")
     mine: FloatArray = rows[(modes - 1) // 6 + 1 == body].copy()
     mine[:, 2] -= 6 * (body - 1)
     return mine
 
 
-def _column_kind(rows: FloatArray) -> str:
-    """Say whether the first column is a period or a frequency: in long waves heave is 1."""
+def _column_kind(owner: str, rows: FloatArray) -> str:
+    """Say whether the first column is a period or a frequency: in long waves heave is 1.
+
+    Raises InputError if it is near 1 at neither end.
+    """
     heave = rows[rows[:, 2] == 3]
     if not heave.size:
         return "period (s)"
     amplitude = np.hypot(heave[:, 5], heave[:, 6])
     first = amplitude[heave[:, 0] == heave[:, 0].min()].mean()
     last = amplitude[heave[:, 0] == heave[:, 0].max()].mean()
-    return "frequency (rad/s)" if abs(first - 1.0) < abs(last - 1.0) else "period (s)"
+    off_first, off_last = abs(first - 1.0), abs(last - 1.0)
+    if not min(off_first, off_last) <= _NEAR:
+        raise InputError(
+            f"{owner}: heave must be near 1 in the longest waves, which are at one end of the "
+            f"first column; it is {first:.3g} and {last:.3g} there. Are these forces (WAMIT's .2 "
+            "and .3), or waves that are all short? In that case say waves=period or "
+            "waves=frequency (--waves)"
+        )
+    return "frequency (rad/s)" if off_first < off_last else "period (s)"
 
 
-def _six(
+def six_modes(
     owner: str,
     omega: FloatArray,
     beta: FloatArray,

@@ -1,6 +1,7 @@
 """`stillhook new`: a commented case file that runs as it is."""
 
 import argparse
+import os
 import shlex
 from pathlib import Path
 
@@ -35,6 +36,6 @@ def written(arguments: argparse.Namespace, text: str) -> Path:
     from models.basics import InputError
 
     path = Path(arguments.file)
-    if path.exists() and not arguments.force:
+    if os.path.exists(path) and not arguments.force:
         raise InputError(f"{path}: exists already; --force overwrites it")
     return write_text_atomically(path, text)

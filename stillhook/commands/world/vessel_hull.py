@@ -70,7 +70,7 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compute, check, show and write; return 0."""
+    """Compute, check, show and write; return 0, or 1 if the motions cannot be vouched for."""
     from models.vessel.hull import usual_frequencies, vessel_from_hull
 
     low, high = parse_range("--frequencies", arguments.frequencies)

@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 from models.basics import InputError
@@ -16,14 +17,16 @@ from ..working import conclude, prepared_table
 ARGUMENTS = (
     options(
         """
-        file  a RAO file: CSV, WAMIT .4, OrcaFlex .yml, Capytaine .nc, MSS .mat, ShipX .re1; or a
-            bundled vessel
-        --read-as {csv,netcdf,wamit,orcaflex,capytaine,mss,shipx}  what it is (default: its contents
-            tell)
-        --out PATH  a .csv or .nc file, or a folder (default: out/<name of the vessel>)
+        file  a RAO file: CSV, WAMIT .4 or .out, OrcaFlex .yml, AQWA .LIS, Capytaine .nc, MSS .mat,
+            ShipX .re1; or a bundled vessel
+        --read-as {csv,netcdf,wamit,orcaflex,capytaine,mss,shipx,aqwa,wamit-listing}  what it is
+            (default: its contents tell)
+        --out PATH  a .csv, .nc, .4 (WAMIT) or .yml (OrcaFlex) file, or a folder (default: out/<name
+            of the vessel>)
         --speed V  which forward speed [m/s]
         --body BODY  which body of several
         --length L  WAMIT's ULEN [m] (default: 1)
+        --heading B  the one heading of a CSV file that has no column of them [deg]
         --waves {period,frequency}  first column of a WAMIT file (default: the heave of long waves
             tells)
         --symmetry {none,xz plane,yz plane,xz and yz planes,circular}  of the vessel, to fill in
@@ -37,6 +40,7 @@ ARGUMENTS = (
         """,
         speed=within(),
         length=within(),
+        heading=within(),
         depth=within(),
         origin=numbers(3),
         roll_damping=within(),
@@ -45,7 +49,7 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, check, show and write; return 0."""
+    """Read, check, show and write; return 0, or 1 if the check ends in doubt or says nothing."""
     body = arguments.body
     with told_once():
         raos = read_raos(
@@ -54,6 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
             speed=arguments.speed,
             body=int(body) if body and body.isdigit() else body,
             length=arguments.length,
+            heading=arguments.heading,
             depth=arguments.depth,
             origin=arguments.origin,
             vessel_type=arguments.vessel_type,
@@ -67,6 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
     if table.exists() and Path(arguments.file).exists() and table.samefile(arguments.file):
         raise InputError(f"{table}: is the file itself; --out must name another")
     report = rao_report(raos, check_long_waves(raos), stem=table.stem)
+    if not arguments.check:
+        report = replace(report, ok=None)  # taken as it is, as asked
     folder.keep(write_raos(table, raos))
     folder.draw(report.drawings)
     file = shlex.quote(str(table))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 import textwrap
 
 import pytest
@@ -106,12 +107,12 @@ WRONG = {
     ),
     "zero peak period": (
         ("peak_period: 9 s", "peak_period: 0"),
-        "my.yaml:6: sea.peak_period: must be a time in (0, 60] s, got 0",
+        "my.yaml:6: sea.peak_period: must be a time in [0.5, 60] s, got 0",
     ),
     "not a number": (
         ("significant_height: 2 m", "significant_height: .nan"),
-        "my.yaml:5: sea.significant_height: must be a length in (0, 30] m, got nan, which is not "
-        "finite",
+        "my.yaml:5: sea.significant_height: must be a length in [0.001, 30] m, got nan, which is "
+        "not finite",
     ),
     "infinite": (
         ("length: 1000 m", "length: .inf"),
@@ -164,11 +165,12 @@ WRONG = {
     "missing field in a motor": (
         ("    inertia: 20 kg m2\n", ""),
         "my.yaml:31: winch.motor.inertia: is missing; it must be a moment of inertia in "
-        "(0, 1e+06] kg m2",
+        "[1e-06, 1e+06] kg m2",
     ),
     "bad field in a motor": (
         ("inertia: 20 kg m2", "inertia: 0"),
-        "my.yaml:34: winch.motor.inertia: must be a moment of inertia in (0, 1e+06] kg m2, got 0",
+        "my.yaml:34: winch.motor.inertia: must be a moment of inertia in [1e-06, 1e+06] kg m2, "
+        "got 0",
     ),
     "unknown motor": (
         ("type: ac", "type: hydraulic"),
@@ -322,6 +324,21 @@ def test_several_findings_of_one_section(check):
     ]
 
 
+@pytest.mark.parametrize(
+    ("name", "field", "value", "message"),
+    [
+        ("thesis-1975", "sea.significant_period", "6e-9 s", "must be a time in [0.5, 60] s"),
+        ("subsea-crane", "sea.peak_period", "0.4 s", "must be a time in [0.5, 60] s"),
+        ("subsea-crane", "sea.significant_height", "1e-9 m", "must be a length in [0.001, 30] m"),
+        ("subsea-crane", "winch.motor.inertia", 1e-12, "moment of inertia in [1e-06, 1e+06] kg m2"),
+        ("subsea-crane", "winch.motor.thermal_time_constant", 0.1, "time in [1, 1e+06] s"),
+    ],
+)
+def test_ranges_begin_at_what_means_something(name, field, value, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        load_case(name).replace({field: value})
+
+
 def test_both_ratings_below_the_static_load(check):
     lines = check(("8 kN m", "4 kN m"), ("14.4 kN m", "5 kN m"))
     assert len(lines) == 2
@@ -361,6 +378,12 @@ class TestPhysics:
         )
         degrees = [f"{-2 * i} deg" for i in range(18)]
         load_case("thesis-1975").replace({"vessel.heave_rao.phase": degrees})
+
+    def test_a_rope_that_is_stretched_beyond_what_holds(self):
+        assert self.warned({"rope.axial_stiffness": "2 MN"}, "thesis-1975") == (
+            "thesis-1975: rope.axial_stiffness: the load at rest stretches the rope by 19 % of its "
+            "length: wire parts at 2 %, fibre ropes work below 5 %"
+        )
 
     def test_voltage_below_the_back_emf(self):
         assert self.warned({"winch.drive.voltage": 700}) == (

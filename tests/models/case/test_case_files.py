@@ -63,7 +63,8 @@ class TestFiles:
                 "must hold sections (sea:, vessel:, rope:, ...) at the top, "
                 "got 'Dear sir or madam'",
             ),
-            (b"\x89PNG\r\n\x1a\n\x00", "is not a text file (byte 0)"),
+            (b"\x89PNG\r\n\x1a\n\x00", "is no text file, but a picture (PNG)"),
+            (b"name: caf\xe9\n", "is not a text file (byte 9)"),
             (b"a: \x00\n", "is not a text file (it holds a zero byte)"),
             (b"---\na: 1\n---\nb: 2\n", "must hold one YAML document, got 2"),
         ],
@@ -114,6 +115,39 @@ class TestFiles:
         path.write_text("\n".join(laughs))
         with pytest.raises(InputError, match="has more than 100000 entries"):
             load_case(path)
+
+    def test_an_anchor_that_is_set_anew_is_no_matter(self):
+        data, _ = read_yaml("a: &x 1\nb: &x 2\nc: *x\n", "test")
+        assert data == {"a": 1, "b": 2, "c": 2}
+
+    @pytest.mark.parametrize(
+        ("name", "text", "message"),
+        [
+            ("a.yaml", "a: " + "[" * 3000 + "]" * 3000, "is nested deeper than 20 levels"),
+            ("a.json", '{"a":' * 3000 + "1" + "}" * 3000, "is nested deeper than 20 levels"),
+            ("a.toml", "a = " + "[" * 3000 + "]" * 3000, "is nested too deep; no case is"),
+            ("a.yaml", "a: " + "1" * 5000, "is not YAML: Exceeds the limit (4300 digits)"),
+            ("a.toml", "a = " + "1" * 5000, "is not TOML: Exceeds the limit (4300 digits)"),
+            ("a.yaml", "a: " + "x" * 5_000_000, "must be at most 4 MB, got 5 MB"),
+            ("a.toml", "a = '" + "x" * 5_000_000, "must be at most 4 MB, got 5 MB"),
+            ("a.yaml", "a: [" + "1, " * 100_001 + "1]", "has more than 100000 entries"),
+            ("a" * 300, "", "no such case file or bundled case"),
+        ],
+        ids=lambda value: value[:20],
+    )
+    def test_what_is_too_long_or_too_deep_for_a_case(self, name, text, message, tmp_path):
+        path = tmp_path / name
+        if text:
+            path.write_text(text)
+        with pytest.raises(InputError, match=re.escape(message)) as caught:
+            load_case(path)
+        assert "\n" not in str(caught.value)
+
+    def test_composing_ends_at_the_limit_of_nodes(self):
+        # Without it the whole text would be made into nodes first: what follows is no YAML.
+        text = "a: [" + "1, " * 100_001 + "]\n}"
+        with pytest.raises(InputError, match="has more than 100000 entries"):
+            read_yaml(text, "test")
 
     def test_yaml_is_version_1_2(self):
         data, _ = read_yaml("a: 1e6\nb: no\nc: 12:30\nd: 010\ne: 1.6E8\n", "test")

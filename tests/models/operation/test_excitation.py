@@ -336,6 +336,18 @@ class TestRecord:
             before, after = third[500 * node - 1], third[500 * node]
             assert abs(after - before) < 0.01 * np.max(np.abs(third))
 
+    def test_a_record_of_a_few_waves_earns_a_remark(self, tmp_path):
+        path = tmp_path / "short.csv"
+        for count, short in ((101, True), (301, False)):  # 20 s and 60 s
+            t, z = sine_record(count=count)
+            rows = "".join(f"{a},{b}\n" for a, b in zip(t, z, strict=True))
+            path.write_text(f"time,displacement\n{rows}")
+            if short:
+                with pytest.warns(PhysicsWarning, match=r"short\.csv, 20 s .* shorter than 60 s"):
+                    assert RecordMotion.read(path).duration == pytest.approx(20.0)
+            else:
+                assert RecordMotion.read(path).duration == pytest.approx(60.0)
+
     def test_a_motion_survives_the_way_through_a_record(self, crane):
         z = crane.motion(120.0, 0.1, seed=8)
         record = RecordMotion.from_arrays(z.time(0, z.rows), whole(z)[0], detrend="none")

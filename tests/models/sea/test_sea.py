@@ -412,7 +412,7 @@ def test_a_measured_sea_has_the_energy_of_its_table(gap, seed, beyond):
         ({"kind": "pierson"}, "spectrum must be one of bretschneider-1975, .*; got 'pierson'"),
         ({"significant_height": 0.0}, "significant_height must be above 0 m, got 0.0"),
         ({"significant_height": math.nan}, "significant_height must be above 0 m, got nan"),
-        ({"peak_period": 0.0}, "peak_period must be above 0 s, got 0.0"),
+        ({"peak_period": 6e-9}, "peak_period must be at least 0.5 s, got 6e-09"),
         ({"peak_period": None}, r"jonswap needs peak_period \[s\]"),
         ({"significant_period": 8.0}, r"takes peak_period \[s\], not significant_period"),
         ({"gamma": 0.5}, r"gamma must be in \[1, 7\], got 0.5"),

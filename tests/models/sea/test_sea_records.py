@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -259,6 +260,15 @@ class TestLibrary:
         dataset.to_netcdf(path, engine="scipy")
         records = self.check(path, "ndbc-netcdf", rejected=1)
         assert records.quality.rejections[0].reason == "all values missing"
+
+    def test_what_is_no_file_of_spectra_is_named(self, tmp_path):
+        path = tmp_path / "seas.csv"
+        path.write_bytes(b"PK\x03\x04\x14\x00xl/workbook.xml\x00")
+        with pytest.raises(InputError, match="is no file of wave spectra, but an Excel workbook"):
+            read_seas(path)
+        os.mkfifo(tmp_path / "pipe")
+        with pytest.raises(InputError, match="is a device or a pipe; a file is wanted"):
+            read_seas(tmp_path / "pipe", file_format="swan")
 
     def test_another_netcdf(self, tmp_path, xr):
         path = tmp_path / "other.nc"

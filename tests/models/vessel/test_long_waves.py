@@ -129,6 +129,7 @@ def test_a_table_of_short_waves_is_read_with_a_remark() -> None:
     found = check_long_waves(without_the_longest(RAOS, 0.6))
     assert not found.mistake
     assert "too short" in found.remarks[0]
+    assert not found.ok  # it says nothing
 
 
 def test_motions_that_are_not_given_are_not_held_against_it() -> None:

@@ -16,19 +16,21 @@ from scipy.interpolate import CubicSpline
 from scipy.io import savemat
 from vessel_tables import (
     DATA,
+    aqwa_text,
     mirrored,
     mss_vessel,
     orcaflex_text,
     shipx_text,
     swinging,
+    wamit_listing_text,
     wamit_text,
 )
 
-from models.basics import InputError
+from models.basics import InputError, PhysicsWarning
 from models.sea import SeaSpectrum
 from models.vessel import VesselRaos
 from models.vessel.assemble import grid
-from models.vessel.readers import bundled_vessels, read_raos, write_raos
+from models.vessel.readers import bundled_vessels, check_long_waves, read_raos, write_raos
 from models.vessel.readers.orcaflex import parse_orcaflex
 
 RAOS = swinging()
@@ -98,8 +100,105 @@ def test_what_is_written_reads_back_to_the_last_digit(suffix: str, tmp_path: Pat
     assert np.allclose(found.heading, raos.heading, rtol=1e-15, atol=1e-15)
     for field in ("name", "origin", "phase_origin", "depth", "speed", "notes", "source"):
         assert getattr(found, field) == getattr(raos, field)
-    with pytest.raises(InputError, match=r"must end in \.csv or \.nc"):
+    with pytest.raises(InputError, match=r"must end in \.csv, \.4, \.yml, \.nc"):
         write_raos(tmp_path / "out.txt", raos)
+
+
+@pytest.mark.parametrize("suffix", [".4", ".yml"])
+def test_what_is_written_for_other_programs_reads_back(suffix: str, tmp_path: Path) -> None:
+    raos = replace(
+        RAOS, name='tug "A": 1', origin=(1.25, -0.1, 3.0), phase_origin=(7.0, 0.3), depth=48.5
+    )
+    path = write_raos(tmp_path / f"out{suffix}", raos)
+    told = {"origin": raos.origin, "depth": raos.depth} if suffix == ".4" else {}
+    found = read_raos(path, check=False, **told)
+    same(found, raos.with_phase_origin(raos.origin[:2]), 1e-9)
+    assert found.origin == raos.origin
+    assert found.depth == 48.5
+    if suffix == ".yml":
+        assert found.name == raos.name
+    with pytest.raises(InputError, match=r"has no forward speed, got 2\.5 m/s"):
+        write_raos(path, replace(RAOS, speed=2.5))
+
+
+def test_a_listing_of_aqwa_is_read_to_its_digits(tmp_path: Path) -> None:
+    placed = replace(RAOS, origin=(-3.0, 0.5, 1.5), phase_origin=(-3.0, 0.5), depth=1000.0)
+    text = aqwa_text(placed)
+    found = read_raos(put(tmp_path, "barge.LIS", text))
+    assert np.allclose(found.omega, RAOS.omega, rtol=6e-4)
+    assert np.allclose(found.heading, RAOS.heading, atol=1e-4)
+    assert np.allclose(found.values, RAOS.values, rtol=0.0, atol=3e-4)
+    assert (found.name, found.origin, found.depth) == ("barge", (-3.0, 0.5, 1.5), 1000.0)
+    assert found.phase_origin == (-3.0, 0.5)
+    two = put(tmp_path, "two.LIS", text + aqwa_text(replace(placed, depth=1000.0), structure=2))
+    with pytest.raises(InputError, match="there are structures 1, 2: say which, as in body=1"):
+        read_raos(two)
+    assert np.allclose(read_raos(two, body=2).values, found.values)
+    with pytest.raises(InputError, match="body must be one of 1, 2, got 3"):
+        read_raos(two, body=3)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("2023 R1", "19.0", r"a listing of AQWA 19\.0: those of 2023 R1 are read"),
+        ("VERSION", "EDITION", "a listing of AQWA of unknown version"),
+        ("       9.810", "      32.174", "GRAVITY must be that of metres, 9.81, got 32.174"),
+        ("   R.A.O.S-", "   F.A.O.S-", "no table R.A.O.S-VARIATION WITH WAVE PERIOD/FREQUENCY"),
+        ("PERIOD   FREQ   DIR", "FREQ   PERIOD   DIR", "columns must be PERIOD, FREQ, DIRECTION"),
+        ("STRUCTURE C.O.G.", "STRUCTURE", "line STRUCTURE C.O.G. of structure 1 is missing"),
+        ("WATER  DEPTH  . . . . . . . . . . . . . . . . =   1000.0000", "", "WATER DEPTH must be"),
+    ],
+)
+def test_a_listing_of_aqwa_that_is_wrong_is_answered(
+    before: str, after: str, words: str, tmp_path: Path
+) -> None:
+    text = aqwa_text(RAOS)
+    assert before in text
+    with pytest.raises(InputError, match=words):
+        read_raos(put(tmp_path, "a.LIS", text.replace(before, after)))
+
+
+def test_the_two_tables_of_aqwa_are_held_against_each_other(tmp_path: Path) -> None:
+    lines = aqwa_text(RAOS).splitlines()
+    row = next(n for n, line in enumerate(lines) if line.startswith("   78.54"))
+    lines[row] = f"{lines[row][:27]}    0.5000{lines[row][37:]}"
+    with pytest.raises(InputError, match=r"two tables of RAOs differ at 78\.54 s, direction 0"):
+        read_raos(put(tmp_path, "a.LIS", "\n".join(lines)))
+    lines = aqwa_text(RAOS).splitlines()
+    lines[row] = lines[row][:60]
+    with pytest.raises(InputError, match=r"amplitude and phase of six motions, got \d+ numbers"):
+        read_raos(put(tmp_path, "b.LIS", "\n".join(lines)))
+
+
+def test_a_listing_of_wamit_has_phases_to_a_degree(tmp_path: Path) -> None:
+    text = wamit_listing_text(replace(RAOS, depth=400.0), length=90.0, place=(5.0, 0.0, 2.0, 0.0))
+    found = read_raos(put(tmp_path, "tanker.out", text), check=False)
+    away = replace(RAOS, depth=400.0, phase_origin=(-5.0, 0.0)).with_phase_origin((0.0, 0.0))
+    assert np.allclose(found.omega, RAOS.omega, rtol=1e-6)
+    assert np.all(np.abs(found.values - away.values) <= 0.0088 * np.abs(away.values) + 1e-6)
+    assert (found.name, found.origin, found.depth) == ("tanker", (0.0, 0.0, 2.0), 400.0)
+    assert any("phases to a degree; the .4 file has more" in note for note in found.notes)
+    assert check_long_waves(read_raos(put(tmp_path, "b.out", wamit_listing_text(RAOS)))).ok
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("RESPONSE AMPLITUDE OPERATORS", "", "no RESPONSE AMPLITUDE OPERATORS in this listing of"),
+        ("9.81000", "32.1740", "Gravity must be that of metres, 9.81, got 32.174"),
+        ("PHIBODY =   0.0", "PHIBODY =  90.0", "PHIBODY must be 0, .* got 90 deg"),
+        ("XBODY", "ZBODY", "there is no XBODY of body 1"),
+        ("Length scale", "Length", "Length scale must be above 0, got nothing"),
+    ],
+)
+def test_a_listing_of_wamit_that_is_wrong_is_answered(
+    before: str, after: str, words: str, tmp_path: Path
+) -> None:
+    text = wamit_listing_text(RAOS)
+    assert before in text
+    with pytest.raises(InputError, match=words):
+        read_raos(put(tmp_path, "a.out", text.replace(before, after)))
 
 
 def test_a_csv_of_ones_own_tells_its_convention_in_remarks(tmp_path: Path) -> None:
@@ -128,10 +227,15 @@ def test_a_csv_of_ones_own_tells_its_convention_in_remarks(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ("heave_real", "heaves_real", "a column must be a motion"),
+        ("heave_real", "heaves_real", r"a column must be .* or a motion .*; got 'heaves_real'"),
         ("heave_imag", "heave_real", "each once"),
-        ("omega [rad/s]", "omega [furlongs]", "first column must be omega"),
-        ("heading [deg]", "direction", "second column must be heading"),
+        (
+            "omega [rad/s]",
+            "omega [furlongs]",
+            r"a column must be omega .* got 'omega \[furlongs\]'",
+        ),
+        ("omega [rad/s],", "yaw_amplitude,", "there must be a column omega .* 'Period .s.'"),
+        ("heading [deg]", "course", "got 'course'.*'Heave amp .m/m.', 'Heave phase .deg.' will do"),
         ("roll_real", "roll_real [inch]", r"unit \[inch\] of roll_real is not known"),
         ("# depth: inf", "# depth: shallow", "depth must be in .*, got 'shallow'"),
         ("# origin: 0.0, 0.0, 0.0", "# origin: 0.0, 0.0", "origin must be 3 numbers"),
@@ -145,6 +249,62 @@ def test_a_csv_that_is_wrong_is_answered_by_field(
     assert before in text
     with pytest.raises(InputError, match=words):
         read_raos(put(tmp_path, "b.csv", text.replace(before, after, 1)), file_format="csv")
+
+
+TABLE = [(40.0, 1.0, -1.0), (14.0, 0.8, -12.5), (8.0, 0.25, -60.0), (5.0, 0.05, 100.0)]
+
+
+@pytest.mark.parametrize(
+    ("head", "mark", "comma"),
+    [
+        ("Period (s); Heading (deg); Heave amp (m/m); Heave phase (deg)", ";", True),
+        ("Period [s],Wave direction [deg],Heave RAO [m/m],Heave phase [deg]", ",", False),
+        (
+            "sep=;\nT (s);Dir (\N{DEGREE SIGN});Heave Ampl. (-);Heave Phase (\N{DEGREE SIGN})",
+            ";",
+            False,
+        ),
+        ('"Wave period (s)"\t"beta"\t"Amplitude heave"\t"Phase heave"', "\t", True),
+        ("Heave amp; Heave phase (deg); Heading; Period (s)", ";", True),
+        ("Period (s); Heave amp (m/m); Heave phase (deg)", ";", True),
+        ("# heading: 180\nPeriod (s), Heave amp (m/m), Heave phase (deg)", ",", False),
+    ],
+)
+def test_a_table_is_read_by_the_names_that_people_write(
+    head: str, mark: str, comma: bool, tmp_path: Path
+) -> None:
+    lines = [head]
+    for period, size, phase in TABLE:
+        cells = [str(period), "180", str(size), str(phase)]
+        if head.startswith("Heave"):
+            cells = [*cells[2:], cells[1], cells[0]]
+        if not re.search("(?i)heading [(]|heading;|dir|beta", head):
+            del cells[1]
+        lines.append(mark.join(cells).replace(".", "," if comma else "."))
+    path = put(tmp_path, "tug.csv", "\n".join(lines).encode())
+    bare = head.startswith("Period (s); Heave")
+    found = read_raos(path, heading=180.0) if bare else read_raos(path)
+    assert found.heading_deg == pytest.approx([180.0])
+    assert 2.0 * math.pi / found.omega[::-1] == pytest.approx([p for p, _, _ in TABLE][::-1])
+    heave = found.mode("heave")[:, 0]
+    assert np.abs(heave) == pytest.approx([size for _, size, _ in TABLE])
+    assert np.degrees(np.angle(heave)) == pytest.approx([phase for *_, phase in TABLE])
+    if bare:
+        with pytest.raises(InputError, match=r"no column of headings .* --heading 180, or a line"):
+            read_raos(path)
+    elif "# heading" not in head:
+        with pytest.raises(InputError, match="heading must not be given: the file has a column"):
+            read_raos(path, heading=180.0)
+
+
+def test_mss_keeps_the_vessels_name(tmp_path: Path) -> None:
+    assert read_raos(put(tmp_path, "a.mat", mat(RAOS))).name == "swing"
+    # What every vessel is called that came by a file input.re1.
+    held = mss_vessel(RAOS)
+    held["vessel"]["main"]["name"] = "input"  # type: ignore[index]
+    target = io.BytesIO()
+    savemat(target, held)
+    assert read_raos(put(tmp_path, "supply.mat", target.getvalue())).name == "supply"
 
 
 def test_wamit_takes_frequencies_a_length_limits_and_several_bodies(tmp_path: Path) -> None:
@@ -164,6 +324,43 @@ def test_wamit_takes_frequencies_a_length_limits_and_several_bodies(tmp_path: Pa
         read_raos(both)
     with pytest.raises(InputError, match="body must be one of 1, 2, got 3"):
         read_raos(both, body=3)
+
+
+def test_wamit_forces_are_no_motions(tmp_path: Path) -> None:
+    # Forces over rho g A L^n: as large as the water plane in long waves, nothing in short ones.
+    forces = wamit_text(replace(RAOS, values=RAOS.values * 63.0))
+    for suffix in (".3", ".2"):
+        with pytest.raises(InputError, match=f"WAMIT writes exciting forces.* to a {suffix} file"):
+            read_raos(put(tmp_path, f"a{suffix}", forces))
+    headed = " WAMIT Numeric Output -- Filename  ellipsoid.3    06-Dec-2016\n" + forces
+    with pytest.raises(InputError, match=r"b\.4: is called 'ellipsoid\.3' inside"):
+        read_raos(put(tmp_path, "b.4", headed))
+    bare = put(tmp_path, "c.4", forces)
+    with pytest.raises(InputError, match="heave must be near 1 in the longest waves"):
+        read_raos(bare)
+    with pytest.raises(InputError, match="heave must be at most 50 m/m, got 6"):
+        read_raos(bare, waves="period")
+    assert np.abs(read_raos(bare, waves="period", check=False).mode("heave")).max() > 50.0
+
+
+def test_wamit_of_short_waves_alone_asks_what_its_first_column_is(tmp_path: Path) -> None:
+    short = replace(RAOS, omega=RAOS.omega[5:], values=0.5 * RAOS.values[5:])
+    path = put(tmp_path, "a.4", wamit_text(short))
+    with pytest.raises(InputError, match=r"all short\? In that case say waves=period"):
+        read_raos(path)
+    with pytest.warns(PhysicsWarning, match="too short for the check"):
+        assert np.allclose(read_raos(path, waves="period").omega, short.omega)
+
+
+def test_wamit_says_which_body_is_read_and_which_is_left_out(tmp_path: Path) -> None:
+    second = re.sub(r"(?m)^(\S+ \S+) +(\d)", lambda m: f"{m[1]} {int(m[2]) + 6}", wamit_text(SHIP))
+    alone = read_raos(put(tmp_path, "a.4", second))
+    assert any("body 2: modes 7 to 12, the only ones in the file" in n for n in alone.notes)
+    both = read_raos(put(tmp_path, "b.4", wamit_text(RAOS) + second), body=1)
+    assert any("body 1: modes 1 to 6; left out: body 2" in note for note in both.notes)
+    assert not any(
+        "body" in note for note in read_raos(put(tmp_path, "c.4", wamit_text(RAOS))).notes
+    )
 
 
 def test_what_a_file_does_not_tell_can_be_told(tmp_path: Path) -> None:
@@ -207,6 +404,45 @@ def test_orcaflex_units_of_waves_and_angles(
     for angles in ("degrees", "radians"):
         text = orcaflex_text(RAOS, wave=wave, waves=waves, key=key, angles=angles)
         same(read_raos(put(tmp_path, "a.yml", text)), RAOS)
+
+
+@pytest.mark.parametrize(
+    ("units", "metres"),
+    [
+        ("SI", 1.0),
+        ("US", 0.3048),
+        ("User\n  LengthUnits: m\n  MassUnits: kg\n  ForceUnits: N", 1.0),
+        ("User\n  LengthUnits: ft\n  MassUnits: te", 0.3048),
+        ("User\n  LengthUnits: km", 1000.0),
+    ],
+)
+@pytest.mark.parametrize("wave", ["amplitude", "max wave slope"])
+def test_orcaflex_lengths_are_in_the_unit_of_the_file(
+    units: str, metres: float, wave: str, tmp_path: Path
+) -> None:
+    placed = replace(RAOS, origin=(4.0, -1.0, 2.0), phase_origin=(4.0, -1.0), depth=120.0)
+    text = orcaflex_text(placed, wave=wave, units=units, metres=metres, depth=120.0)
+    found = read_raos(put(tmp_path, "a.yml", text), check=False)
+    same(found, placed)
+    assert found.origin == pytest.approx((4.0, -1.0, 2.0))
+    assert found.phase_origin == pytest.approx((4.0, -1.0))
+    assert found.depth == pytest.approx(120.0)
+    assert any("converted" in note for note in found.notes) == (metres != 1.0)
+    # What a user says of the depth goes before what the file does.
+    assert read_raos(tmp_path / "a.yml", check=False, depth=70.0).depth == 70.0
+
+
+def test_orcaflex_long_waves_are_those_of_the_files_water_depth(tmp_path: Path) -> None:
+    # A right table for 12 m of water: surge and sway are twelve times what they are in deep water.
+    shallow = replace(RAOS, depth=12.0)
+    k, deep = shallow.wave_number(shallow.omega), RAOS.wave_number(RAOS.omega)
+    sweep, turn = 1.0 / np.tanh(12.0 * k)[:, None], (k / deep)[:, None]
+    ones = np.ones_like(turn)
+    scale = np.stack([sweep, sweep, ones, turn, turn, turn], axis=-1)
+    text = orcaflex_text(replace(shallow, values=RAOS.values * scale), depth=12.0)
+    check = check_long_waves(read_raos(put(tmp_path, "a.yml", text)))
+    assert check.ok
+    assert {row.verdict for row in check.rows} == {"ok"}
 
 
 @pytest.mark.parametrize("sense", ["leads", "lags"])
@@ -264,7 +500,10 @@ def test_orcaflex_phase_origin_is_another_point_than_the_rao_origin(tmp_path: Pa
     [
         ("    RAOPhaseConvention: leads\n", "", "RAOPhaseConvention is missing"),
         ("RAOWaveUnit: amplitude", "RAOWaveUnit: furlong", "RAOWaveUnit must be one of amplitude"),
-        ("UnitsSystem: SI", "UnitsSystem: US", "UnitsSystem must be SI, got 'US'"),
+        ("UnitsSystem: SI", "UnitsSystem: CGS", "UnitsSystem must be one of SI, US, User"),
+        ("UnitsSystem: SI", "UnitsSystem: User", "LengthUnits is missing"),
+        ("UnitsSystem: SI", "UnitsSystem: User\n  LengthUnits: kg", "such as m, km, ft; got 'kg'"),
+        ("General:", "Environment:\n  WaterDepth: deep\nGeneral:", "WaterDepth must be .* 'deep'"),
         ("VesselTypes:", "VesselKinds:", "no list of VesselTypes"),
         ("DisplacementRAOs:", "OtherRAOs:", "it may have load RAOs only"),
         ("RAODirection: 30", "RAODirection: north", "RAODirection must be a finite number"),
@@ -283,7 +522,10 @@ def test_an_orcaflex_file_that_is_wrong_is_answered_by_key(
 def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
     for name, content, words in (
         ("a.yml", "name: subsea-crane\nsea: {}\n", "no RAO file of a kind that is known"),
-        ("a.bin", bytes(range(256)) * 4, "a binary file of no kind"),
+        ("a.csv", "Tp;Heave\n8;1\n", "a table has columns such as 'Period"),
+        ("a.bin", bytes(range(256)) * 4, "no RAO file, but a binary file of no kind"),
+        ("a.csv", b"PK\x03\x04\x14\x00xl/workbook.xml\x00", "no RAO file, but an Excel workbook"),
+        ("a.4", b"\x89PNG\r\n\x1a\n\x00", r"no RAO file, but a picture \(PNG\)"),
         ("a.txt", "   \n", "the file is empty"),
         ("a.re8", shipx_text({0.0: RAOS}).replace("MOTION", "FORCE"), "holds forces"),
         ("a.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "version 7.3 are not read"),
@@ -295,7 +537,7 @@ def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no bundled vessel of this name"):
         read_raos("queen-mary")
     with pytest.raises(InputError, match="format must be one of csv"):
-        read_raos(put(tmp_path, "a.4", wamit_text(RAOS)), file_format="aqwa")
+        read_raos(put(tmp_path, "a.4", wamit_text(RAOS)), file_format="nemoh")
     with pytest.raises(InputError, match="draught says nothing about a wamit file"):
         read_raos(tmp_path / "a.4", draught="deep")
     known = r"ulen says nothing .* \(its options: body, depth, length, origin, waves\)"
@@ -303,6 +545,10 @@ def test_what_is_no_rao_file_is_said_to_be_none(tmp_path: Path) -> None:
         read_raos(tmp_path / "a.4", ulen=80.0)
     with pytest.raises(InputError, match="is a folder"):
         read_raos(tmp_path)
+    with pytest.raises(InputError, match="no bundled vessel of this name"):
+        read_raos("a" * 300)
+    with pytest.raises(InputError, match="no text, as was expected, but an Excel workbook"):
+        read_raos(tmp_path / "a.csv", file_format="wamit")
 
 
 @pytest.mark.parametrize("kind", ["wamit", "shipx", "orcaflex"])
@@ -344,6 +590,7 @@ def test_the_supply_vessel_of_mss_and_of_shipx_is_one() -> None:
     assert np.allclose(text.heading, matlab.heading, atol=1e-12)
     assert np.allclose(text.values, matlab.values, rtol=0.0, atol=1e-12)
     assert text.name == "Supply"
+    assert matlab.name == "supply"
     assert text.origin == pytest.approx((-5.38592, 0.0, 0.0))
 
 
@@ -397,6 +644,53 @@ def test_the_tanker_of_wamit_keeps_the_limits_of_long_waves() -> None:
     assert head[2] == pytest.approx(1.0, abs=2e-3)
     assert head[4] / k == pytest.approx(-1j, abs=6e-3)
     assert beam[3] / k == pytest.approx(-1j, abs=1e-2)
+
+
+BEM = DATA / "bemrosetta"
+needs_bem = pytest.mark.skipif(not BEM.is_dir(), reason="the real files are not here")
+
+
+@needs_bem
+def test_the_exciting_forces_of_an_ellipsoid_are_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"ellipsoid\.3: WAMIT writes exciting forces to a \.3 file"
+    ):
+        read_raos(BEM / "ellipsoid.3")
+
+
+@needs_bem
+def test_a_box_of_aqwa_keeps_the_limits_of_long_waves() -> None:
+    box = read_raos(BEM / "aqwa_box1.LIS")
+    check = check_long_waves(box)
+    assert check.ok
+    assert {row.verdict for row in check.rows} == {"ok"}
+    assert (box.origin, box.depth, box.heading.size) == ((0.0, 2.0, -1.0), 70.0, 4)
+    # Phases relative to the crest above the centre of gravity: 2 m to port would turn them 12 deg.
+    sway = box.response(1.0, 0.5 * math.pi)[1]
+    assert complex(sway) == pytest.approx(-0.9091j, abs=1e-4)
+
+
+@needs_bem
+def test_a_listing_of_wamit_without_motions_says_what_it_has() -> None:
+    with pytest.raises(InputError, match="it has diffraction exciting forces and moments"):
+        read_raos(BEM / "ellipsoid.out")
+
+
+@needs_bem
+def test_an_orcaflex_vessel_in_units_of_the_users_own_is_the_one_in_si() -> None:
+    with pytest.warns(PhysicsWarning, match="no usual mistake"):  # odd in both
+        si, own = (read_raos(BEM / f"RunB_{name}.yml") for name in ("SI", "m_kg_kN"))
+    assert np.allclose(si.values, own.values, rtol=1e-6, atol=1e-9)
+    assert (si.depth, own.depth) == (1000.0, 1000.0)
+
+
+@needs_bem
+def test_an_orcaflex_file_tells_its_water_depth() -> None:
+    raos = read_raos(BEM / "Orca.flex.yml")
+    assert raos.depth == 100.0
+    check = check_long_waves(raos)
+    assert check.ok
+    assert {row.verdict for row in check.rows} == {"ok"}
 
 
 def loads(name: str) -> VesselRaos:

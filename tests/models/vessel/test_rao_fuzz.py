@@ -15,7 +15,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
-from vessel_tables import DATA, mss_vessel, orcaflex_text, shipx_text, swinging, wamit_text
+from vessel_tables import (
+    DATA,
+    aqwa_text,
+    mss_vessel,
+    orcaflex_text,
+    shipx_text,
+    swinging,
+    wamit_listing_text,
+    wamit_text,
+)
 
 from models.basics import InputError, PhysicsWarning
 from models.vessel import VesselRaos
@@ -35,6 +44,8 @@ def samples(folder: Path) -> dict[str, bytes]:
         "orcaflex": orcaflex_text(RAOS).encode(),
         "shipx": shipx_text({0.0: RAOS}).encode(),
         "mss": target.getvalue(),
+        "aqwa": aqwa_text(RAOS).encode(),
+        "wamit-listing": wamit_listing_text(RAOS).encode(),
         "csv": write_raos(folder / "a.csv", RAOS).read_bytes(),
         "netcdf": write_raos(folder / "a.nc", RAOS).read_bytes(),
     }
@@ -91,6 +102,7 @@ def headed_noise(data: bytes, rng: random.Random) -> bytes:
     return data[:200] + rng.randbytes(2000)
 
 
+_TEXTS = ("csv", "wamit", "orcaflex", "shipx", "aqwa", "wamit-listing")
 CHANGES = (cut, damaged, permuted, exchanged, holed, stuttered, renumbered, headed_noise)
 
 
@@ -137,7 +149,7 @@ def test_random_bytes_are_no_rao_file(noise: bytes, kind: str | None, tmp_path: 
     assert take(path, kind) is None
 
 
-@given(text=st.text(max_size=300), kind=st.sampled_from(["csv", "wamit", "orcaflex", "shipx"]))
+@given(text=st.text(max_size=300), kind=st.sampled_from(_TEXTS))
 @settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

@@ -295,6 +295,9 @@ def test_new_writes_a_case_that_runs_and_never_overwrites(run):
     assert "stillhook check 'my case.yaml'" in ending.out
     assert run("check", "my case.yaml").status == 0
     Path("my case.yaml").write_text("mine")
+    long = run("new", "a" * 300)
+    assert (long.status, long.out) == (2, "")
+    assert long.err.endswith(": cannot be written: File name too long\n")
     again = run("new", "my case.yaml")
     assert again == Ending(
         status=2, out="", err="my case.yaml: exists already; --force overwrites it\n"

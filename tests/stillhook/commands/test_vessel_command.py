@@ -49,6 +49,16 @@ def test_import_writes_netcdf_and_says_one_line_if_asked(
     assert (out.parent / "swing.svg").is_file()
 
 
+@pytest.mark.parametrize("ending", [".4", ".yml"])
+def test_import_writes_the_files_of_other_programs(
+    ending: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = write_raos(tmp_path / "swing.csv", RAOS), tmp_path / f"other{ending}"
+    assert main(["vessel", "import", str(file), "--out", str(out), "--quiet"]) == 0
+    assert capsys.readouterr().out.startswith("swing: in long waves")
+    assert np.allclose(read_raos(out).values, RAOS.values, rtol=1e-9)
+
+
 def test_a_file_that_contradicts_long_waves_ends_with_two_and_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -64,6 +74,39 @@ def test_a_file_that_contradicts_long_waves_ends_with_two_and_one_line(
     said = capsys.readouterr()
     assert "DOUBTFUL: in long waves" in said.out
     assert "wrong sign" in said.out
+
+
+def test_a_table_of_heave_alone_is_not_said_to_turn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "heave.csv"
+    file.write_text("Period (s);Heave amp (m/m);Heave phase (deg)\n40;1,0;0\n12;0,8;-10\n")
+    words = ["vessel", "import", str(file), "--heading", "180", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "it heaves with the water and has no roll and pitch that could be checked" in said
+    assert "no columns for surge, sway, roll, pitch, yaw" in " ".join(said.split())
+
+
+def test_doubt_and_no_check_are_told_by_the_exit_status(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    odd = replace(RAOS, values=RAOS.values * np.exp(2j * rng.normal(size=(8, 1, 6))))
+    short = replace(RAOS, omega=RAOS.omega[4:], values=RAOS.values[4:])
+    for raos, mark in ((odd, "DOUBTFUL: at"), (short, "not checked: the table begins at 0.7")):
+        file = write_raos(tmp_path / "swing.csv", raos)
+        words = ["vessel", "import", str(file), "--out", str(tmp_path / "out")]
+        assert main(words) == 1
+        said = capsys.readouterr()
+        assert mark in said.out
+        assert "warning" in said.err
+        if raos is short:
+            rows = [line for line in said.out.splitlines() if " heave " in line and " deg " in line]
+            assert rows
+            assert all(line.split()[-2:] == ["not", "long"] for line in rows)
+        assert main([*words, "--no-check"]) == 0
+        assert mark in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

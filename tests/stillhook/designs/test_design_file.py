@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 from pathlib import Path
 
@@ -270,7 +271,15 @@ def test_files_that_are_no_designs(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="is not a design file"):
         sh.load_design("empty.yaml")
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match=r"^binary\.yaml: is not a text file in UTF-8"):
+    with pytest.raises(InputError, match=r"^binary\.yaml: is no text file, but a text in UTF-16"):
+        sh.load_design("binary.yaml")
+    with pytest.raises(InputError, match="no such design file"):
+        sh.load_design("a" * 300)
+    os.mkfifo("pipe")
+    with pytest.raises(InputError, match="pipe: is a device or a pipe; a file is wanted"):
+        sh.load_design("pipe")
+    (tmp_path / "binary.yaml").write_bytes(b"a: \xe9")
+    with pytest.raises(InputError, match=r"^binary\.yaml: is not a text file \(byte 3\)"):
         sh.load_design("binary.yaml")
     (tmp_path / "out").mkdir()
     with pytest.raises(InputError, match=r"^out: is a folder; a design file is wanted$"):

@@ -128,6 +128,8 @@ def test_a_case_whose_line_was_cut_short_is_computed_again(half, whole):
         (lambda s: append(s / JOURNAL, b"half a thought"), "line 20 is not as it was written"),
         (lambda s: append(s / JOURNAL, line({"key": 99, "values": {}})), "there is no case 99"),
         (lambda s: append(s / JOURNAL, line({"key": 3, "values": {}})), "line 20 is no result"),
+        (lambda s: (s / JOURNAL).write_bytes(nested(3000)), "line 1 is not as it was written"),
+        (lambda s: append(s / JOURNAL, nested(3000)), "line 20 is not as it was written"),
         (  # as older versions began a journal
             lambda s: (s / JOURNAL).write_bytes(line({"sweep": "0123456789abcdef"})),
             "is not a sweep that this version of Stillhook has written; remove it, or take",
@@ -151,9 +153,37 @@ def append(path, data):
         file.write(data)
 
 
+def nested(depth):
+    return checked(b'{"key": ' + b"[" * depth + b"]" * depth + b"}")
+
+
 def line(content):
-    text = json.dumps(content).encode()
+    return checked(json.dumps(content).encode())
+
+
+def checked(text):
     return b'{"crc": %d, "of": %b}\n' % (zlib.crc32(text), text)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("seed", 98.5, "its question is spoilt"),
+        ("seed", -1, "seed must be at least 0"),
+        ("samples", "many", "its question is spoilt"),
+        ("samples", 10**12, "samples must be in"),
+        ("metrics", [""], "there is no metric ''"),
+        ("duration", None, "its question is spoilt"),
+        ("options", 3, "its question is spoilt"),
+    ],
+)
+def test_a_question_of_other_kinds_of_values_is_refused(half, field, value, message):
+    first, *rest = (half / JOURNAL).read_bytes().splitlines(keepends=True)
+    content = json.loads(first)["of"]
+    content["question"][field] = value
+    (half / JOURNAL).write_bytes(line(content) + b"".join(rest))
+    with pytest.raises(InputError, match=message):
+        resume_sweep(half, engine="serial")
 
 
 def test_numbers_come_back_to_the_bit(tmp_path):
@@ -205,6 +235,11 @@ def test_what_is_no_store_is_refused(tmp_path):
     with pytest.raises(InputError, match="is not a sweep that this version of Stillhook has"):
         sweep("feedback", SPREAD, store=tmp_path / "a", **HOW)
     assert (tmp_path / "a" / JOURNAL).read_text() == "mine"
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    with pytest.raises(InputError, match="is a device or a pipe; a file is wanted"):
+        resume_sweep(tmp_path / "pipe.nc")
+    with pytest.raises(InputError, match="is a device or a pipe; a file is wanted"):
+        sweep("feedback", SPREAD, store=tmp_path / "pipe.nc", **HOW)
     (tmp_path / "c").write_text("a file")
     with pytest.raises(InputError, match="a file is there"):
         sweep("feedback", SPREAD, store=tmp_path / "c", **HOW)
