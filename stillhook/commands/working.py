@@ -6,7 +6,6 @@ A computation that has something to keep is `stoppable`.
 import argparse
 import contextlib
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -29,6 +28,7 @@ from ..text import (
     number,
     progress,
     show,
+    write_json,
 )
 
 _NAMED = 3  # pictures that are named
@@ -164,7 +164,7 @@ def conclude(
     out = console()
     if arguments.json:
         data = json_data(report) | {"written": [str(path) for path in written]}
-        sys.stdout.write(json_text(data | ({} if result is None else {"result": result})))
+        write_json(json_text(data | ({} if result is None else {"result": result})))
     elif arguments.quiet and brief:
         show(replace(report, sections=brief), out)
     elif arguments.quiet:
