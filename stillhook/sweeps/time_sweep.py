@@ -82,6 +82,7 @@ def run_sweep(
             for answered in pool.answers(tasks) if pool is not None else ():
                 if answered is not None:
                     task, result = answered
+                    died = isinstance(result, Died)
                     if isinstance(result, Died):
                         result = CaseResult(
                             index=task.index,
@@ -90,8 +91,9 @@ def run_sweep(
                             values=dict.fromkeys(question.metrics, math.nan),
                         )
                     code, held = STATUS[result.status], result.status == "completed"
-                    keeper.put(task.index, {"status": code, "stable": float(held), **result.values})
-                    wall += result.wall if result.status != "died" else 0.0
+                    row = {"status": code, "stable": float(held), **result.values}
+                    keeper.put(task.index, row, final=not died)
+                    wall += 0.0 if died else result.wall
                     done += 1
                     if result.message and len(messages) < _TOLD:
                         messages[task.index] = result.message
