@@ -67,7 +67,9 @@ def run_sweep(
     began, wall = clock.perf_counter(), 0.0
     journal, export = (None, None) if store is None else places_of(store)
     if journal is not None:
-        OutputFolder.prepare(journal.parent)
+        folder = OutputFolder.prepare(journal.parent)
+        if export is not None and folder.path == Path(str(store)):  # not one that a file lies in
+            folder.claim(journal, export)
     keeper = Results(template, journal)
     with keeper.journal or contextlib.nullcontext():
         missing = np.flatnonzero(~keeper.done)

@@ -10,7 +10,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .encoding import take_any_text, write_json
-    from .folder import OutputFolder, folder_name, pictures
+    from .folder import OutputFolder, check_own, folder_name, pictures
     from .hook_words import heading_text, heading_words, sea_words, vessel_words
     from .quantities import (
         count,

@@ -6,9 +6,9 @@ import json
 from ...text import Report, write_json
 from ..declare import options
 from ..working import conclude
-from .new import FORCE, written
+from .new import written
 
-ARGUMENTS = (options("[file]  the file to write (default: standard output)"), FORCE)
+ARGUMENTS = (options("[file]  the file to write (default: standard output)"),)
 
 
 def run(arguments: argparse.Namespace) -> int:
