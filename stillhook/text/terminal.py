@@ -65,11 +65,11 @@ def show(item: Report | Table, out: Console) -> None:
     grid.show_header = not bare
     if item.title and item.title != item.headings[0]:
         out.print(item.title, style="bold", soft_wrap=True)
-    headings, *cells = (
+    headings, *rows = (
         [as_written(text, out.encoding) for text in line]
         for line in (item.headings, *map(item.cells, item.shown))
     )
-    texts = dict(zip(item.shown, cells, strict=True))
+    texts = dict(zip(item.shown, rows, strict=True))
     # A column in which nothing stands would take room for nothing.
     used = [k for k in range(len(item.columns)) if not k or any(t[k] for t in texts.values())]
     for k in used:

@@ -6,6 +6,8 @@ import os
 import pickle
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
 from every_command import LINES, RECORD, REPLAY
@@ -23,9 +25,12 @@ ODD = "Kr\u00e4n \u2264 10\u207b\u00b3, \u8d77\u91cd\u673a"
 
 
 def python(program: str, *words: object, **settings: object) -> subprocess.CompletedProcess[bytes]:
-    """Run a program as `stillhook` is run: without the current folder on the path."""
-    command = [sys.executable, "-P", "-c", program, *map(str, words)]
-    return subprocess.run(command, capture_output=True, timeout=900, **settings)  # type: ignore[call-overload]
+    """Run a program as `stillhook` is run: a script of another folder."""
+    with tempfile.TemporaryDirectory() as scripts:
+        script = Path(scripts, "script.py")
+        script.write_text(program)
+        command = [sys.executable, str(script), *map(str, words)]
+        return subprocess.run(command, capture_output=True, timeout=900, **settings)  # type: ignore[call-overload]
 
 
 @pytest.fixture(scope="module")
