@@ -22,13 +22,21 @@ STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline headline_page landing
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test test-ci test-all lint bench docs studies holds clean
+.PHONY: help demo bem waves cluster zarr test test-ci test-all lint bench docs studies holds clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F'\t' '{printf "make %-9s %s\n", $$1, $$2}'
 
 demo: $(VENV)/.installed  ## install, then find the gains of the bundled subsea crane
 	$(VENV)/bin/stillhook optimise subsea-crane --out out/subsea-crane
+
+bem: $(VENV)/.installed-bem  ## the extra for vessels from their hulls
+
+waves: $(VENV)/.installed-waves  ## the extra for measured and hindcast spectra
+
+cluster: $(VENV)/.installed-cluster  ## the extra for sweeps on a cluster
+
+zarr: $(VENV)/.installed-zarr  ## the extra for results as Zarr
 
 test: $(VENV)/.installed-dev  ## the tests of every change, within 6 minutes on two cores
 	$(PY) -m pytest $(PYTEST_ARGS)
@@ -71,12 +79,8 @@ $(VENV)/.installed: pyproject.toml constraints.txt | $(PY)
 	$(call install,.)
 	@touch $@
 
-$(VENV)/.installed-dev: pyproject.toml constraints.txt | $(PY)
-	$(call install,.[dev])
-	@touch $(VENV)/.installed $@
-
-$(VENV)/.installed-docs: pyproject.toml constraints.txt | $(PY)
-	$(call install,.[docs])
+$(VENV)/.installed-%: pyproject.toml constraints.txt | $(PY)
+	$(call install,.[$*])
 	@touch $(VENV)/.installed $@
 
 define install

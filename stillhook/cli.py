@@ -14,6 +14,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
+from typing import TextIO
 
 # Before numpy is imported.  The matrices here have some tens of rows: threads of the linear
 # algebra libraries would spend their time waiting for each other, several times slower on a
@@ -79,6 +80,9 @@ COMMANDS = (
 )
 
 
+_SPELT = {"optimize": "optimise"}
+
+
 def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     """Return the parser of all commands, or with the arguments of the one that `words` name alone.
 
@@ -131,7 +135,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises SystemExit from the parser: with 0 for ``--help`` and ``--version``, with 2 for arguments
     that it does not understand.
     """
-    words = sys.argv[1:] if argv is None else argv
+    from .text import take_any_text
+
+    words = _spelt(sys.argv[1:] if argv is None else argv)
+    take_any_text()
     parser = build_parser(words)
     try:
         arguments = parser.parse_args(words)
@@ -147,10 +154,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     except BrokenPipeError:
         # The reader (`head`, a closed pager) has what it wanted; leave Python nothing to flush.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _leave(sys.stdout)
         return OK
     except KeyboardInterrupt as stop:
-        print(f"stillhook: interrupted{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
+        _tell(f"stillhook: interrupted{f'; {stop}' if str(stop) else ''}")
         return INTERRUPTED
     except Exception as error:
         if "--debug" in words:
@@ -158,20 +165,39 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _failed(error)
 
 
+def _spelt(words: Sequence[str]) -> list[str]:
+    """Return the words of a command, which is written in British spelling."""
+    first = next((k for k, word in enumerate(words) if not word.startswith("-")), 0)
+    return [_SPELT.get(word, word) if k == first else word for k, word in enumerate(words)]
+
+
 def _failed(error: Exception) -> int:
     """Write one sentence (or one for each error in a file), and return the exit status."""
     from models.basics import InputError, StillhookError
 
     if isinstance(error, InputError):
-        print(error, file=sys.stderr)
+        _tell(str(error))
         return BAD_INPUT
     if isinstance(error, OSError) and error.filename is not None:  # a place that was named
         print(f"{error.filename}: {error.strerror}", file=sys.stderr)
         return BAD_INPUT
     hint = "run the command again with --debug to see where"
     if isinstance(error, StillhookError):
-        print(f"stillhook: the computation failed: {error}; {hint}", file=sys.stderr)
+        _tell(f"stillhook: the computation failed: {error}; {hint}")
         return NOT_OK
     what = f"{type(error).__name__}: {error}".partition("\n")[0]
-    print(f"stillhook: unexpected error, {what}; {hint}", file=sys.stderr)
+    _tell(f"stillhook: unexpected error, {what}; {hint}")
     return OUR_FAULT
+
+
+def _tell(sentence: str) -> None:
+    """Write a sentence to standard error, if anybody still reads it."""
+    try:
+        print(sentence, file=sys.stderr, flush=True)
+    except BrokenPipeError:
+        _leave(sys.stderr)
+
+
+def _leave(stream: TextIO) -> None:
+    """Let nothing more be written to a stream whose reader has gone."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

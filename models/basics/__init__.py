@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         check_range,
         check_seed,
         digits_apart,
+        how_to_install,
         range_text,
         read_only,
     )

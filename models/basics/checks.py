@@ -42,6 +42,14 @@ class PhysicsWarning(UserWarning):
     """
 
 
+def how_to_install(extra: str) -> str:
+    """Return what to do where an extra is not installed; no index has Stillhook under its name."""
+    return (
+        f"run `make {extra}` in Stillhook's source folder, or pip install -e '.[{extra}]' there; "
+        f"of a wheel, pip install 'FILE.whl[{extra}]'"
+    )
+
+
 def check_range(
     owner: str,
     name: str,

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..casefile import Section
+from ..casefile import LINE, LINES, Section
 from ..rig import Crane, GainBounds, Gains, Limits, Payload, Rigging, Rope, Sensors, Winch
 from ..sea import Sea
 from ..vessel import Vessel
@@ -16,11 +16,11 @@ class Contents(Section):
 
     stillhook: Literal[1]
     """Version of the case format."""
-    name: Annotated[str, Field(min_length=1, max_length=100)]
+    name: Annotated[str, Field(min_length=1, max_length=100), LINE]
     """Name of the case."""
-    description: str = ""
+    description: Annotated[str, LINES] = ""
     """What the case is, in a sentence or two."""
-    sources: dict[str, str] | None = None
+    sources: dict[Annotated[str, LINE], Annotated[str, LINES]] | None = None
     """Where the figures come from: free text under free keys."""
     sea: Sea
     """The sea state."""

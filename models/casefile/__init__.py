@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .data_file import FOLDER, DataFile
     from .messages import Path, line_of, message_line, suggestion
     from .paths import plain, replaced
-    from .quantity import Quantity
+    from .quantity import LINE, LINES, Quantity
     from .section import Section, describe, problems
     from .yaml_lines import case_text, read_yaml, yaml_text
 else:

@@ -27,11 +27,11 @@ def line_of(path: Path, lines: Mapping[Path, int] | None) -> int:
 
 
 def path_text(path: Sequence[str | int]) -> str:
-    """Return a path as text: `vessel.heave_rao.omega[3]`."""
+    """Return a path as text: `vessel.heave_rao.omega[3]`; what steers a terminal is escaped."""
     text = ""
     for item in path:
         text += f"[{item}]" if isinstance(item, int) else f".{item}" if text else str(item)
-    return text
+    return text if text.isprintable() else repr(text)[1:-1]
 
 
 def suggestion(key: object, known: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""Field types of a case file: quantities with their ranges, as pydantic annotations.
+"""Field types of a case file: quantities with their ranges, and texts, as pydantic annotations.
 
 `Annotated[float, Quantity("length", 0.005, 0.3)]` is a field that takes a number in metres or a
 text such as `44 mm`, holds a float in SI, refuses what lies outside the range, and knows how to
@@ -7,10 +7,11 @@ describe itself in an error message, in the JSON Schema and in the documentation
 
 import math
 import re
+import unicodedata
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from ..basics import KINDS, InputError, range_text, read_quantity, units_of
@@ -91,6 +92,28 @@ class Quantity:
         if self.word:
             choices.append({"const": self.word})
         return {"anyOf": choices, "x-range": self.range, "x-unit": self.shown_unit}
+
+
+def _line(text: str) -> str:
+    return _checked(text, "", "a line of text")
+
+
+def _lines(text: str) -> str:
+    return _checked(text, "\n\t", "text")
+
+
+def _checked(text: str, but: str, wanted: str) -> str:
+    """Return a text; what steers a terminal, or is half a character, is refused."""
+    for character in text:
+        if unicodedata.category(character) in ("Cc", "Cs") and character not in but:
+            raise InputError(
+                f"must be {wanted} without control characters, got U+{ord(character):04X}"
+            )
+    return text
+
+
+LINE = AfterValidator(_line)  #: Of a field that is a line of text, without control characters.
+LINES = AfterValidator(_lines)  #: The same, but for line ends and tabs.
 
 
 def _pattern(kind: str) -> str:

@@ -116,6 +116,8 @@ def _walk(model: type[Section], loc: Sequence[str | int]) -> tuple[Path, type[Se
     members: tuple[type[Section], ...] = (model,)
     owner: type[Section] | None = model
     for item in loc:
+        if item == "[key]":  # what is wrong is the key before it
+            continue
         tagged = {tag[1]: member for member in members if (tag := discriminator(member))}
         if len(members) > 1 and item in tagged:
             members = (tagged[str(item)],)

@@ -16,7 +16,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..basics import GZIP, FloatArray, InputError, check_file, check_hdf5, read_bytes
+from ..basics import (
+    GZIP,
+    FloatArray,
+    InputError,
+    check_file,
+    check_hdf5,
+    how_to_install,
+    read_bytes,
+)
 from .quality import RawRecords
 
 FORMATS: dict[str, str] = {
@@ -68,14 +76,14 @@ _MOST_VALUES = 3e8  # densities of one file: 2.4 GB
 def read_with_library(path: str, name: str) -> RawRecords:
     """Read a file of one format of :data:`FORMATS`, or `netcdf` to find out which one it is.
 
-    Raises InputError if `stillhook[waves]` is not installed, or the file cannot be read.
+    Raises InputError if the extra `waves` is not installed, or the file cannot be read.
     """
     try:
         importlib.import_module("wavespectra")
     except ImportError:
         shown = FORMATS.get(name, "NetCDF")
         raise InputError(
-            f"{path}: reading {shown} needs the library wavespectra: pip install 'stillhook[waves]'"
+            f"{path}: reading {shown} needs the library wavespectra: {how_to_install('waves')}"
         ) from None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what is read, the quality control tells

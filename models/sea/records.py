@@ -210,7 +210,7 @@ def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords
     They come in the order of time, with the account of the rest.  The format is one of
     `models.sea.library_files.FORMATS`; it is found out if left out.
 
-    Raises InputError if the file cannot be read, its format is unknown or needs `stillhook[waves]`,
+    Raises InputError if the file cannot be read, its format is unknown or needs the extra `waves`,
     or no record is left after quality control.
     """
     return _read(str(path), file_format, file_stamp(path))

@@ -4,8 +4,9 @@ A simulation spends its time in one recursion (`models.simulation.kernel`); CasA
 and this file turns that into a shared library with whatever C compiler the machine has. Libraries
 are kept in the user's cache folder under a name made of a digest of everything they depend on and a
 digest of their own bytes, so the next run finds its own and a file that was cut short is seen
-before it is loaded.  No file is ever changed in place: several processes may build the same library
-at once.
+before it is loaded.  A library is code, so the folder is its user's alone, and what others own or
+may write is not loaded.  No file is ever changed in place: several processes may build the same
+library at once.
 """
 
 import atexit
@@ -17,6 +18,7 @@ import os
 import platform
 import shlex
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -58,7 +60,8 @@ def find_compiler() -> Compiler | None:
         except ValueError:  # quotes that do not close
             continue
         program = shutil.which(words[0]) if words else None
-        if program:
+        # One that lies in the current folder (Windows looks there first) is not meant.
+        if program and (os.path.isabs(program) or os.path.dirname(words[0])):
             command = (program, *words[1:])
             stamp = os.stat(program)
             version = _version(command, stamp.st_mtime_ns, stamp.st_size)
@@ -91,15 +94,15 @@ def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:
     parts = (source, machine, compiler.version, *compiler.command, *flags)
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:40]
     reason: object = "no folder can be written to"
-    for place in (cache_folder, _own_folder):
+    for place in (_kept_folder, _own_folder):
         try:
             folder = place()
             found = _load_kept(folder, key)
             if found is not None:
                 return found
-            folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(prefix="build-", dir=folder) as scratch:
                 built = _build(source, compiler, flags, Path(scratch))
+                built.chmod(0o700)
                 library = folder / _name(key, built.read_bytes())
                 os.replace(built, library)
             keep_latest(folder, f"*{_suffix()}", KEPT)
@@ -119,7 +122,7 @@ def _load_kept(folder: Path, key: str) -> ctypes.CDLL | None:
     for path in kept:
         try:
             # Loading a file that was cut short can end the process, so look first.
-            if path.name == _name(key, path.read_bytes()):
+            if _ours(path) and path.name == _name(key, path.read_bytes()):
                 library = ctypes.CDLL(str(path))
                 with contextlib.suppress(OSError):
                     os.utime(path)  # used today: the last to be tidied away
@@ -160,6 +163,29 @@ def _run(
         timeout=limit,
         check=False,
     )
+
+
+def _kept_folder() -> Path:
+    """Return the folder of libraries in the cache, made if need be; nobody else may look into it.
+
+    Raises OSError if it cannot be made, or is somebody else's.
+    """
+    folder = cache_folder() / "kernels"
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not _ours(folder):
+        folder.chmod(0o700)  # fails where it is another's
+        if not _ours(folder):
+            raise PermissionError(f"{folder}: is not this user's own")
+    return folder
+
+
+def _ours(path: Path) -> bool:
+    """Return whether a file or folder, no link, is this user's and nobody else may write it."""
+    if os.name != "posix":
+        return True  # the rights of a user's own cache folder hold for what is in it
+    found = path.lstat()
+    mine = found.st_uid == os.geteuid() and not stat.S_ISLNK(found.st_mode)
+    return mine and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 @functools.lru_cache(maxsize=1)

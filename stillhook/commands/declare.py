@@ -193,5 +193,6 @@ EVERYWHERE = options(
     --json  print what came of it as JSON, and nothing else
     --no-figures  draw no figures
     --format {svg,png}  format of the figures (default: both)
+    --force  write into a folder that holds other people's files, or over a file that exists
     """
 )

@@ -6,7 +6,6 @@ A computation that has something to keep is `stoppable`.
 import argparse
 import contextlib
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -21,6 +20,7 @@ from ..text import (
     Progress,
     Report,
     ReportSection,
+    check_own,
     commands,
     console,
     folder_name,
@@ -29,6 +29,7 @@ from ..text import (
     number,
     progress,
     show,
+    write_json,
 )
 
 _NAMED = 3  # pictures that are named
@@ -108,8 +109,14 @@ def kept_in(folder: Path) -> list[str]:
 
 
 def place_for(arguments: argparse.Namespace, name: str, ending: str = "") -> Path:
-    """Return where results go: the place that is given, or one in ``out`` by a name."""
-    return Path(arguments.out or Path("out") / f"{folder_name(name)}{ending}")
+    """Return where results go: the place that is given, or one in ``out`` by a name.
+
+    Raises InputError if it is a folder that holds other people's files, unless `arguments.force`.
+    """
+    place = Path(arguments.out or Path("out") / f"{folder_name(name)}{ending}")
+    if not arguments.force:
+        check_own(place)
+    return place
 
 
 def prepared(arguments: argparse.Namespace, place: str | Path, ending: str = "") -> OutputFolder:
@@ -117,10 +124,15 @@ def prepared(arguments: argparse.Namespace, place: str | Path, ending: str = "")
 
     They may name it; else it is `place`, or by that name, and the ending, as for `place_for`.
     """
-    kinds = ("svg", "png") if arguments.format is None else (arguments.format,)
     if isinstance(place, str):
         place = place_for(arguments, place, ending)
-    return OutputFolder.prepare(place, kinds if arguments.figures else ())
+    return OutputFolder.prepare(place, _kinds(arguments))
+
+
+def _kinds(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """Return the kinds of figures that the arguments ask for."""
+    every = ("svg", "png") if arguments.format is None else (arguments.format,)
+    return every if arguments.figures else ()
 
 
 def prepared_table(
@@ -130,9 +142,10 @@ def prepared_table(
     from models.vessel.readers import ENDINGS
 
     target = place_for(arguments, name)
-    alone = target.suffix.lower() in ENDINGS
-    folder = prepared(arguments, target.parent if alone else target)
-    return folder, target if alone else folder.path / table
+    if target.suffix.lower() not in ENDINGS:
+        folder = prepared(arguments, target)
+        return folder, folder.at(table)
+    return OutputFolder.prepare(target.parent, _kinds(arguments), listing=False), target
 
 
 def conclude(
@@ -166,7 +179,7 @@ def conclude(
     out = console()
     if arguments.json:
         data = json_data(report) | {"written": [str(path) for path in written]}
-        sys.stdout.write(json_text(data | ({} if result is None else {"result": result})))
+        write_json(json_text(data | ({} if result is None else {"result": result})))
     elif arguments.quiet and brief:
         show(replace(report, sections=brief), out)
     elif arguments.quiet:

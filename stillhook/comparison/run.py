@@ -171,7 +171,7 @@ def compare(
         if out is not None:
             from ..text import OutputFolder
 
-            store = Store(OutputFolder.prepare(out).path / STORE, question)
+            store = Store(OutputFolder.prepare(out).at(STORE), question)
             stack.enter_context(store.journal)
         campaign = Campaign(
             question=question,

@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import pickle
+import sys
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -193,12 +195,23 @@ def _identity(make: Make) -> tuple[str, bool]:
     """Return a digest of a recipe's function, and whether another process can use it.
 
     A function that was written at a prompt is known to its own process alone, and nobody can
-    tell whether it is still the same tomorrow: it gets a digest that never comes again.
+    tell whether it is still the same tomorrow: it gets a digest that never comes again.  So does
+    one of a module that only the current folder leads to, where other processes do not look.
     """
     try:
         data = pickle.dumps(make)
     except (pickle.PicklingError, AttributeError, TypeError, RuntimeError):
         return uuid.uuid4().hex, False
-    if b"__main__" in data:
+    if any(name.encode() in data for name in ("__main__", *_beside())):
         return uuid.uuid4().hex, False
     return hashlib.sha256(data).hexdigest()[:16], True
+
+
+def _beside() -> list[str]:
+    """Return the modules that were found in the current folder, which the path does not name."""
+    here = os.getcwd()
+    if here in sys.path:
+        return []
+    files = {n: getattr(m, "__file__", None) for n, m in sys.modules.items() if "." not in n}
+    tops = {n: file.removesuffix(f"{os.sep}__init__.py") for n, file in files.items() if file}
+    return [name for name, top in tops.items() if os.path.dirname(top) == here]

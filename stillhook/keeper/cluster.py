@@ -4,11 +4,12 @@
 
 A worker that is killed loses nothing: the scheduler gives its tasks to others, and starts anew
 what they need.  At most a few tasks for each thread are under way at once, so that a million of
-them burden no scheduler.  Needs the extra ``stillhook[cluster]``.
+them burden no scheduler.  Needs the extra ``cluster``.
 """
 
 import contextlib
 import functools
+import os
 import pickle
 import queue
 import threading
@@ -19,10 +20,11 @@ from typing import Any
 
 from typing_extensions import override
 
-from models.basics import InputError, SolverError, check_range
+from models.basics import InputError, SolverError, check_range, how_to_install
 
 from .digest import code_digest
 from .pool import POLL, Bench, Died, Pool, Task
+from .processes import full_paths
 
 _AHEAD = 3  # tasks under way for each thread of the cluster
 _PATIENCE = 60.0  # for a scheduler to answer and to have a worker [s]
@@ -129,6 +131,25 @@ class Cluster(Pool):
         self.jobs = max(1, sum(self._running.nthreads().values()))
         self._counted = clock.monotonic()
 
+    def _started(self) -> Any:
+        """Return a cluster on this machine.
+
+        Raises InputError if its processes do not start.
+        """
+        try:
+            return _distributed().LocalCluster(
+                n_workers=self._size,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=50,  # only what is critical: killed workers are no news
+            )
+        except (RuntimeError, OSError, TimeoutError) as error:
+            raise InputError(
+                f"cluster {self._address!r}: its processes did not start ({error}); is there "
+                "memory for so many? What was done is kept: the same command goes on"
+            ) from error
+
     @contextlib.contextmanager
     def _connected(self) -> Iterator[Any]:
         """Connect to the cluster, or start one; both end with the block."""
@@ -139,15 +160,8 @@ class Cluster(Pool):
         with contextlib.ExitStack() as stack:
             address = self._address
             if self._size:
-                address = stack.enter_context(
-                    distributed.LocalCluster(
-                        n_workers=self._size,
-                        threads_per_worker=1,
-                        processes=True,
-                        dashboard_address="127.0.0.1:0",
-                        silence_logs=50,  # only what is critical: killed workers are no news
-                    )
-                )
+                stack.enter_context(_isolated())
+                address = stack.enter_context(self._started())
             try:
                 client = distributed.Client(address, timeout=_PATIENCE)
             except (OSError, TimeoutError, ValueError) as error:
@@ -163,6 +177,21 @@ class Cluster(Pool):
                     "with `dask worker ADDRESS --nthreads 1`"
                 ) from None
             yield client
+
+
+@contextlib.contextmanager
+def _isolated() -> Iterator[None]:
+    """Let Python processes that start meanwhile find nothing in the current folder."""
+    before = {name: os.environ.get(name) for name in ("PYTHONSAFEPATH", "PYTHONPATH")}
+    found = full_paths((before["PYTHONPATH"] or "").split(os.pathsep))
+    os.environ.update(PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join(found))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
 
 
 def _do(pickled: bytes, task: Task, code: str) -> Any:
@@ -191,7 +220,5 @@ def _distributed() -> Any:
     try:
         import distributed
     except ImportError:
-        raise InputError(
-            "a cluster needs dask.distributed: pip install 'stillhook[cluster]'"
-        ) from None
+        raise InputError(f"a cluster needs dask.distributed: {how_to_install('cluster')}") from None
     return distributed

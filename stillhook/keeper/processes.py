@@ -4,9 +4,11 @@
 
 A process is started with the path of its parent and nothing else: neither the parent's memory nor
 its main script, so that it works the same on every system, from a script without a main guard,
-from a notebook and from the command line.  Each has one thread here that hands it a task and waits
-for the answer, so that it is known which task a process died of.  The processes have a session of
-their own: Ctrl-C reaches the parent alone, which ends them.
+from a notebook and from the command line.  It starts isolated (``-I``), and of the path it has the
+folders that are named in full: a ``json.py`` beside somebody's case files is not run.  Each has one
+thread here that hands it a task and waits for the answer, so that it is known which task a process
+died of.  The processes have a session of their own: Ctrl-C reaches the parent alone, which ends
+them.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from typing import IO, Any
 
 from typing_extensions import override
@@ -48,7 +50,7 @@ class _Process:
         self._tasks: queue.Queue[tuple[Task, bytes] | None] = queue.Queue()
         self._said = tempfile.TemporaryFile()  # noqa: SIM115
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, json.dumps(sys.path)],
+            [sys.executable, "-I", "-c", _START, json.dumps(full_paths(sys.path))],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._said,
@@ -177,6 +179,11 @@ class Processes(Pool):
             process = _Process(self._bench, self._answers)
         self._idle.append(process)
         return task, answer
+
+
+def full_paths(paths: Iterable[str]) -> list[str]:
+    """Return the folders that are named in full: not the current one, nor what starts from it."""
+    return [path for path in paths if os.path.isabs(path)]
 
 
 def serve() -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .report import place_of, sweep_data, sweep_report, write_sweep
     from .store import stored_question
     from .sweeping import resume_sweep, spread_of, sweep
-    from .time_metrics import STATUS
+    from .time_metrics import STATUS, UNKNOWN
     from .usual import fault_spread, usual_spread
     from .words import SweepSummary, varied_paths, worst_cases
 else:

@@ -9,7 +9,7 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from models.basics import InputError, pick, replace_atomically
+from models.basics import InputError, how_to_install, pick, replace_atomically
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
@@ -64,7 +64,7 @@ def _zarr(result: xr.Dataset, place: Path) -> Path:
     try:
         import zarr  # noqa: F401
     except ImportError:
-        raise InputError(f"{place}: needs zarr: pip install 'stillhook[zarr]'") from None
+        raise InputError(f"{place}: needs zarr: {how_to_install('zarr')}") from None
 
     def write(new: Path) -> None:
         try:

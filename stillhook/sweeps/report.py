@@ -82,11 +82,11 @@ def write_sweep(folder: str | Path, result: xr.Dataset, *, worst: int = 0) -> li
         written.append(place.write(name, text))
     written.append(place.write("spread.yaml", spread_of(result).to_yaml()))
     written.append(place.write("summary.json", json_text(sweep_data(result, numbers))))
-    written.append(write_result(result, place.path / "cases.parquet"))
+    written.append(write_result(result, place.at("cases.parquet")))
     if result.sizes["case"] <= _FEW:
-        written.append(write_result(result, place.path / "cases.csv"))
+        written.append(write_result(result, place.at("cases.csv")))
     if result.attrs.get("mode") != "time":
-        written.append(write_result(result, place.path / "result.nc"))
+        written.append(write_result(result, place.at("result.nc")))
     return written
 
 

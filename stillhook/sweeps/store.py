@@ -162,10 +162,10 @@ class Results:
         """Which cases are there (n,)."""
         return np.asarray(self._values["status"] != STATUS["not run"])
 
-    def put(self, index: int, row: Mapping[str, float]) -> None:
-        """Keep the numbers of a case, by variable."""
+    def put(self, index: int, row: Mapping[str, float], *, final: bool = True) -> None:
+        """Keep the numbers of a case, by variable; not final ones in memory alone."""
         self._take(index, row)
-        if self.journal is not None:
+        if final and self.journal is not None:
             self.journal.add(index, row)
 
     def dataset(self) -> xr.Dataset:

@@ -28,7 +28,9 @@ STATUS: Mapping[str, int] = MappingProxyType(
 )
 """What became of a case, and its code: ran to its end; the state was no number any more; the
 payload moves more than the hook with the drive saturated; the supervisor closed the brake; there
-is no such case or controller; the process died of it, twice."""
+is no such case or controller; its process was killed, twice: nothing is known, and it is tried
+again when the sweep goes on."""
+UNKNOWN = (STATUS["not run"], STATUS["died"])  #: Codes of cases that no share counts.
 
 # Share of the second half of a run in which a limit cycle has its drive saturated.
 _SATURATED = 0.05

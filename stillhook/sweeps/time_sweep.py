@@ -67,7 +67,9 @@ def run_sweep(
     began, wall = clock.perf_counter(), 0.0
     journal, export = (None, None) if store is None else places_of(store)
     if journal is not None:
-        OutputFolder.prepare(journal.parent)
+        folder = OutputFolder.prepare(journal.parent)
+        if export is not None and folder.path == Path(str(store)):  # not one that a file lies in
+            folder.claim(journal, export)
     keeper = Results(template, journal)
     with keeper.journal or contextlib.nullcontext():
         missing = np.flatnonzero(~keeper.done)
@@ -82,6 +84,7 @@ def run_sweep(
             for answered in pool.answers(tasks) if pool is not None else ():
                 if answered is not None:
                     task, result = answered
+                    died = isinstance(result, Died)
                     if isinstance(result, Died):
                         result = CaseResult(
                             index=task.index,
@@ -90,8 +93,9 @@ def run_sweep(
                             values=dict.fromkeys(question.metrics, math.nan),
                         )
                     code, held = STATUS[result.status], result.status == "completed"
-                    keeper.put(task.index, {"status": code, "stable": float(held), **result.values})
-                    wall += result.wall if result.status != "died" else 0.0
+                    row = {"status": code, "stable": float(held), **result.values}
+                    keeper.put(task.index, row, final=not died)
+                    wall += 0.0 if died else result.wall
                     done += 1
                     if result.message and len(messages) < _TOLD:
                         messages[task.index] = result.message

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError, Share, check_range, pick, share
+from models.basics import Share, SolverError, check_range, pick, share
 
-from .time_metrics import STATUS
+from .time_metrics import STATUS, UNKNOWN
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +29,11 @@ _AFTER = {  # what a status says, after "1 case" and after "N cases"
     "limit cycle": ("ended in a limit cycle", "ended in a limit cycle"),
     "brake": ("was stopped by the brake", "were stopped by the brake"),
     "failed": ("could not be run", "could not be run"),
-    "died": ("killed its process", "killed their processes"),
+    "died": (
+        "is left out, its process was killed twice: it is tried again when the sweep goes on",
+        "are left out, their processes were killed twice: they are tried again when the sweep "
+        "goes on",
+    ),
     "not run": ("was not run", "were not run"),
 }
 _NO_NUMBERS = ("stable", "status")
@@ -51,18 +55,18 @@ class SweepSummary:
     def of(cls, result: xr.Dataset) -> SweepSummary:
         """Return the summary of a result.
 
-        Raises InputError if no case of it was run.
+        Raises SolverError if no case of it was run to its end.
         """
         ran = np.ones(result.sizes["case"], np.bool_)
         statuses: dict[str, int] = {}
         if "status" in result:
             codes = result["status"].to_numpy()
-            ran = codes != STATUS["not run"]
+            ran = ~np.isin(codes, UNKNOWN)
             for name, code in STATUS.items():
                 if name != "completed" and (count := int((codes == code).sum())):
                     statuses[name] = count
         if not ran.any():
-            raise InputError("sweep: no case was run")
+            raise SolverError(f"sweep: no case was run to its end{_first_message(result)}")
         stable = (result["stable"].to_numpy() == 1) & ran
         quantiles, units = {}, {}
         for label, variable in result.data_vars.items():
@@ -111,6 +115,10 @@ class SweepSummary:
         return "\n".join(mark + line for mark, line in zip(marks, lines, strict=True))
 
 
+def _first_message(result: xr.Dataset) -> str:
+    return "".join(f": {text}" for text in list(result.attrs.get("messages", []))[:1])
+
+
 def worst_cases(result: xr.Dataset, count: int, *, by: str = "payload_rms") -> list[int]:
     """Return the numbers of so many of the worst cases, the worst first.
 
@@ -127,7 +135,7 @@ def worst_cases(result: xr.Dataset, count: int, *, by: str = "payload_rms") -> l
     order = np.lexsort((number, -np.nan_to_num(values, nan=np.inf), stable))
     if "status" in result:  # of cases that were not run, or not to be run, nothing is known
         codes = result["status"].to_numpy()
-        unknown = (codes == STATUS["not run"]) | (codes == STATUS["failed"])
+        unknown = np.isin(codes, (*UNKNOWN, STATUS["failed"]))
         order = order[~unknown[order]]
     return [int(number[i]) for i in order[:count]]
 

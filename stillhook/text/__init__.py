@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .folder import OutputFolder, folder_name, pictures
+    from .encoding import take_any_text, write_json
+    from .folder import OutputFolder, check_own, folder_name, pictures
     from .hook_words import heading_text, heading_words, sea_words, vessel_words
     from .quantities import (
         count,

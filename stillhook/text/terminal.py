@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from models.basics import PhysicsWarning
 
+from .encoding import as_written
 from .table import Bar, Drawing, Report, Table
 
 if TYPE_CHECKING:
@@ -41,8 +42,12 @@ def console(*, stderr: bool = False) -> Console:
     """Return a console; on anything but a terminal it writes 80 columns without colour."""
     from rich.console import Console
 
+    class Piped(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # not SystemExit: that the reader has gone is no failure
+
     # No markup, no highlighting, no emoji codes: names and paths come from the user.
-    return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
+    return Piped(stderr=stderr, markup=False, highlight=False, emoji=False)
 
 
 def show(item: Report | Table, out: Console) -> None:
@@ -60,11 +65,15 @@ def show(item: Report | Table, out: Console) -> None:
     grid.show_header = not bare
     if item.title and item.title != item.headings[0]:
         out.print(item.title, style="bold", soft_wrap=True)
-    texts = {row: item.cells(row) for row in item.shown}
+    headings, *rows = (
+        [as_written(text, out.encoding) for text in line]
+        for line in (item.headings, *map(item.cells, item.shown))
+    )
+    texts = dict(zip(item.shown, rows, strict=True))
     # A column in which nothing stands would take room for nothing.
     used = [k for k in range(len(item.columns)) if not k or any(t[k] for t in texts.values())]
     for k in used:
-        column, heading = item.columns[k], item.headings[k]
+        column, heading = item.columns[k], headings[k]
         # Labels and the last words give way where the line is full, and never a figure.
         words = k == 0 or (column.left and k == used[-1])
         grid.add_column(
@@ -81,7 +90,7 @@ def show(item: Report | Table, out: Console) -> None:
     indent = (0, 0, 0, 0 if wide else 2)
     out.print(Padding(grid, indent, expand=False))
     for note in item.notes:
-        out.print(Padding(Text(note), indent, expand=False))
+        out.print(Padding(Text(as_written(note, out.encoding)), indent, expand=False))
 
 
 def _show_report(report: Report, out: Console) -> None:
@@ -90,7 +99,8 @@ def _show_report(report: Report, out: Console) -> None:
     from rich.text import Text
 
     about = f": {report.about}" if report.about else ""
-    out.print(Text.assemble((report.name, "bold"), about))
+    name, about = (as_written(text, out.encoding) for text in (report.name, about))
+    out.print(Text.assemble((name, "bold"), about))
     if report.status:
         mark = report.verdict_mark
         style = "bold green" if mark == "ok" else "bold red"
@@ -104,7 +114,8 @@ def _show_report(report: Report, out: Console) -> None:
             out.print(section.title, style="bold", soft_wrap=True)
         for k, item in enumerate(items):
             if isinstance(item, str):
-                out.print(Padding(Text(item.strip("`")), (0, 0, 0, 2), expand=False))
+                text = Text(as_written(item.strip("`"), out.encoding))
+                out.print(Padding(text, (0, 0, 0, 2), expand=False))
                 continue
             if k and isinstance(items[k - 1], Table):
                 out.print()

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stillhook.cli import main
+from stillhook.text.folder import LIST
 
 HERE = Path(__file__).parent
 
@@ -184,8 +185,9 @@ def files() -> dict[str, object]:
             out.mkdir()
             if "buoy" in line:
                 (out / "buoy.txt").write_text(BUOY, encoding="utf-8")
+                (out / LIST).write_text("buoy.txt\n", encoding="utf-8")  # as if it were ours
             code, _ = call(words_of(line, str(out)))
-            every = (p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file())
+            every = (p.relative_to(out).as_posix() for p in out.rglob("[!.]*") if p.is_file())
             names = sorted({re.sub(r"\.zarr/.*", ".zarr", name) for name in every})
             found[line] = {"exit": code, "files": names}
     return found

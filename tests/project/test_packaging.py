@@ -15,6 +15,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from models.basics import how_to_install
+
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 PACKAGES = ("stillhook", "models", "synth", "mpc")
@@ -66,6 +68,31 @@ def test_changelog_has_a_place_for_the_next_change():
 def test_no_package_hides_behind_the_tests():
     # tests/models/__init__.py would shadow the package in every test run.
     assert list((ROOT / "tests").rglob("__init__.py")) == []
+
+
+def told_to_users() -> list[Path]:
+    """Return docs, README, notebooks, scripts and sources."""
+    folders = (*PACKAGES, "docs", "notebooks", "benchmarks")
+    found = [path for folder in folders for path in (ROOT / folder).rglob("*")]
+    kept = [p for p in found if p.suffix in (".py", ".md", ".ipynb", ".yaml") and p.is_file()]
+    return [*kept, ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "Makefile"]
+
+
+def test_nobody_is_told_to_install_a_name_that_anybody_may_take():
+    # No index has Stillhook: whoever takes its name there would run code on the user's machine.
+    named = re.compile(
+        r"stillhook\[|pip3? install [^\n]*(?<![\w-])(stillhook|models|synth|mpc)(?![\w/-])"
+    )
+    texts = {path: path.read_text(encoding="utf-8") for path in told_to_users()}
+    assert len(texts) > 400
+    assert {str(path): m[0] for path, text in texts.items() if (m := named.search(text))} == {}
+
+
+@pytest.mark.parametrize("extra", sorted({*PROJECT["optional-dependencies"]} - {"dev", "docs"}))
+def test_every_extra_has_a_chore_that_its_message_names(extra):
+    assert f"`make {extra}`" in how_to_install(extra)
+    said = subprocess.run(["make", "--dry-run", extra], cwd=ROOT, capture_output=True, text=True)
+    assert f"-e '.[{extra}]'" in said.stdout
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,10 @@ def told(case: Any) -> LinearFeedback:
 
 
 class Killer:
-    """Static gains, called from Python; kills its process where the payload is heavy."""
+    """Static gains, called from Python; kills its process where the payload is heavy.
+
+    The environment may spare it (``SPARED=1``), as more memory would.
+    """
 
     name, sample_time = "killer", 0.05
 
@@ -35,7 +38,7 @@ class Killer:
 
     def step(self, measurement: Any, time: float) -> float:
         del measurement
-        if self.deadly and time > 1.0:
+        if self.deadly and time > 1.0 and not os.environ.get("SPARED"):
             os.kill(os.getpid(), signal.SIGKILL)
         return 0.0
 

@@ -42,6 +42,7 @@ from ...basics import (
     cache_folder,
     check_ascending,
     check_range,
+    how_to_install,
     keep_latest,
     replace_atomically,
     wave_frequency,
@@ -71,12 +72,12 @@ def capytaine() -> Any:
         import capytaine as found
     except ImportError as error:
         raise InputError(
-            "a hull is computed by Capytaine, which is not installed: pip install 'stillhook[bem]'"
+            f"a hull is computed by Capytaine, which is not installed: {how_to_install('bem')}"
         ) from error
     if int(found.__version__.partition(".")[0]) < 3:
         raise InputError(
             f"a hull is computed by Capytaine 3 or later, got {found.__version__}: "
-            "pip install --upgrade 'stillhook[bem]'"
+            f"{how_to_install('bem')}"
         )
     return found
 

@@ -86,4 +86,4 @@ def _write(folder: OutputFolder, designs: Sequence[Design], *, bound: bool) -> N
     folder.write(f"{last.structure}.yaml", design_text(last))
     text = markdown(structures_table(designs, bound=bound))
     folder.write("structures.md", f"# Structures for {last.case.name}\n\n{text}")
-    folder.draw(report.drawings, kinds=("svg",))
+    folder.draw(report.drawings)

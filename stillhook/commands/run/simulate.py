@@ -6,7 +6,6 @@ until then is written all the same.
 
 import argparse
 import shlex
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -36,6 +35,7 @@ from ...text import (
     number,
     progress,
     show,
+    write_json,
 )
 from ..declare import CASE, changed_words, options, within
 from ..given import case_words
@@ -151,7 +151,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise next(iter(found.left_out.values()))
         raise KeyboardInterrupt(f"nothing was simulated; {_kept(folder)}")
     if arguments.json:
-        sys.stdout.write(json_text(runs_data(compared)))
+        write_json(json_text(runs_data(compared)))
     elif arguments.quiet:
         for runs in compared:
             console().print(f"{headline_of(runs)}; {tree(runs)[0]}", soft_wrap=True)

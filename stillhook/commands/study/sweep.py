@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from models import Case
 from models.basics import InputError
 from models.spread import Spread
@@ -21,6 +23,7 @@ from synth.sweeps import ATTRIBUTE, law_of
 
 from ...sweeps import (
     STATUS,
+    UNKNOWN,
     place_of,
     sweep_figures,
     sweep_report,
@@ -113,11 +116,12 @@ def run(arguments: argparse.Namespace) -> int:
     swept = _resumed(arguments) if arguments.resume else _swept(arguments)
     result = swept.result
     complete = int(result.attrs.get("complete", 1)) == 1
-    if not complete and not (result["status"] >= 0).any():
+    known = ~np.isin(result.get("status", 0), UNKNOWN)
+    if not complete and not known.any():
         raise KeyboardInterrupt("no case was finished")
     status = _concluded(swept, arguments)
     if not complete:
-        there = count(int((result["status"] >= 0).sum()), "case")
+        there = count(int(known.sum()), "case")
         raise KeyboardInterrupt(
             f"{there} kept; stillhook sweep --resume {shlex.quote(str(swept.folder))} goes on"
         )
@@ -308,7 +312,7 @@ def _figures(swept: Swept, folder: OutputFolder, kind: str) -> None:
     design: Any = swept.design if linear and not in_time else None
     result = swept.result
     if in_time:
-        result = result.isel(case=result["status"].to_numpy() != STATUS["not run"])
+        result = result.isel(case=~np.isin(result["status"].to_numpy(), UNKNOWN))
     for name, figure in sweep_figures(result, design).items():
         folder.write(f"{name}.{kind}", picture(figure, kind))
 
@@ -319,6 +323,9 @@ def _next(
     """Return the commands to go on with; `law` is the file of the worst case's design."""
     folder = swept.folder
     found = []
+    if "status" in swept.result and (swept.result["status"] == STATUS["died"]).any():
+        again = f"stillhook sweep --resume {shlex.quote(str(folder))}"
+        found.append(("the cases that are left out once more", again))
     if worst:
         file = shlex.quote(str(folder / "worst.yaml"))
         structure = law_of(swept.result, worst[0])[0]

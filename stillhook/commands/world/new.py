@@ -9,8 +9,7 @@ from ...text import Report
 from ..declare import options
 from ..working import conclude
 
-FORCE = options("--force  overwrite the file if it exists")
-ARGUMENTS = (options("file  the file to write"), FORCE)
+ARGUMENTS = (options("file  the file to write"),)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -2,14 +2,13 @@
 
 import argparse
 import json
-import sys
 
-from ...text import Report
+from ...text import Report, write_json
 from ..declare import options
 from ..working import conclude
-from .new import FORCE, written
+from .new import written
 
-ARGUMENTS = (options("[file]  the file to write (default: standard output)"), FORCE)
+ARGUMENTS = (options("[file]  the file to write (default: standard output)"),)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -18,7 +17,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     text = json.dumps(case_schema(), indent=2, ensure_ascii=False) + "\n"
     if arguments.file is None:
-        sys.stdout.write(text)  # not through rich, which would break its long lines
+        write_json(text)  # not through rich, which would break its long lines
         return 0
     path = written(arguments, text)
     status = f"begin a case file with `# yaml-language-server: $schema={path}`"

@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     report = records_report(records, chosen, sea, name=arguments.file, steps=steps)
     folder = prepared(arguments, Path(arguments.file).name, "-sea")
     folder.write("records.csv", csv_text(records_table(records)))
-    folder.keep(write_scatter(folder.path / "scatter.csv", records.scatter(**steps)))
+    folder.keep(write_scatter(folder.at("scatter.csv"), records.scatter(**steps)))
     folder.draw(report.drawings)
     quoted = _quoted(arguments.file)
     file = shlex.quote(f"sea={{spectrum: measured, file: {quoted}, record: {chosen}}}")

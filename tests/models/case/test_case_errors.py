@@ -242,6 +242,31 @@ WRONG = {
         ("name: test", "name: 12"),
         "my.yaml:2: name: must be text, got 12",
     ),
+    "a name that steers the terminal": (
+        ("name: test", r'name: "te\e[31mst"'),
+        "my.yaml:2: name: must be a line of text without control characters, got U+001B",
+    ),
+    "a name of two lines": (
+        ("name: test", r'name: "te\nst"'),
+        "my.yaml:2: name: must be a line of text without control characters, got U+000A",
+    ),
+    "a description that steers the terminal": (
+        ("name: test", 'name: test\ndescription: "two\\nlines,\\tand \\u009b2J"'),
+        "my.yaml:3: description: must be text without control characters, got U+009B",
+    ),
+    "a source that rings": (
+        ("name: test", 'name: test\nsources:\n  rope: "a\\ab"'),
+        "my.yaml:4: sources.rope: must be text without control characters, got U+0007",
+    ),
+    "a source under a key that steers": (
+        ("name: test", 'name: test\nsources:\n  "ro\\bpe": a maker'),
+        "my.yaml:4: sources.ro\\x08pe: must be a line of text without control characters, "
+        "got U+0008",
+    ),
+    "an unknown key that steers": (
+        ("name: test", 'name: test\n"s\\e[2Jea": 1'),
+        "my.yaml:3: s\\x1b[2Jea: unknown key; did you mean 'sea'?",
+    ),
     "modulus and stiffness": (
         ("diameter: 50 mm", "diameter: 50 mm\n  modulus: 124 GPa"),
         "my.yaml:11: rope: give either modulus or axial_stiffness, got both",

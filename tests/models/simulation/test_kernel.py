@@ -48,7 +48,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "empty"
     monkeypatch.setenv("STILLHOOK_CACHE", str(folder))
-    return folder
+    return folder / "kernels"
 
 
 def small() -> ca.Function:
@@ -306,7 +306,7 @@ def test_spoilt_library_is_built_again(empty_cache: Path, spoil: str) -> None:
         "k = Kernel(ca.Function('f', [s, s.sym('r'), s.sym('p')], [3*s, s]), compiled=True);"
         "print(k.step([2.0], [0.0], [0.0])[0][0])"
     )
-    environment = {**os.environ, "STILLHOOK_CACHE": str(empty_cache)}
+    environment = {**os.environ, "STILLHOOK_CACHE": str(empty_cache.parent)}
 
     def run() -> str:
         return subprocess.run(
@@ -377,6 +377,83 @@ def test_compiler_that_fails_is_quoted_or_passed_over(
     kernel = Kernel(small())
     assert (kernel.compiled, kernel.note) == (False, said)
     assert list(empty_cache.iterdir()) == []
+
+
+@needs_compiler
+@pytest.mark.skipif(os.name != "posix", reason="owner and mode are those of POSIX")
+def test_the_libraries_are_their_users_alone(empty_cache: Path) -> None:
+    umask = os.umask(0)
+    try:
+        Kernel(small(), compiled=True)
+    finally:
+        os.umask(umask)
+    (library,) = empty_cache.iterdir()
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (empty_cache, library)] == [0o700] * 2
+
+
+@needs_compiler
+@pytest.mark.skipif(os.name != "posix", reason="owner and mode are those of POSIX")
+@pytest.mark.parametrize("whose", ["anybody may write", "another's", "a link"])
+def test_a_library_that_is_not_ours_is_not_loaded(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, whose: str
+) -> None:
+    Kernel(small(), compiled=True)
+    (library,) = empty_cache.iterdir()
+    if whose == "anybody may write":
+        library.chmod(0o722)
+    elif whose == "a link":
+        library.rename(tmp_path / "elsewhere")
+        library.symlink_to(tmp_path / "elsewhere")
+    else:
+        lstat = Path.lstat
+
+        def of_another(path: Path) -> os.stat_result:
+            found = list(lstat(path))
+            found[stat.ST_UID] += path == library
+            return os.stat_result(found)
+
+        monkeypatch.setattr(Path, "lstat", of_another)
+    loaded: list[int] = []
+    load = ctypes.CDLL
+
+    def remember(path: str) -> ctypes.CDLL:
+        loaded.append(Path(path).lstat().st_ino)
+        return load(path)
+
+    before = library.lstat().st_ino
+    monkeypatch.setattr(ctypes, "CDLL", remember)
+    assert Kernel(small(), compiled=True).compiled
+    assert loaded
+    assert before not in loaded
+
+
+@needs_compiler
+@pytest.mark.skipif(os.name != "posix", reason="owner and mode are those of POSIX")
+@pytest.mark.parametrize("whose", ["anybody may write", "another's"])
+def test_a_cache_folder_that_is_not_ours_is_closed_or_done_without(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, whose: str
+) -> None:
+    empty_cache.mkdir(parents=True)
+    empty_cache.chmod(0o777)
+    if whose == "another's":
+        monkeypatch.setattr(os, "geteuid", lambda: empty_cache.stat().st_uid + 1)
+    assert Kernel(small(), compiled=True).compiled
+    assert len(list(empty_cache.iterdir())) == (whose == "anybody may write")
+    assert stat.S_IMODE(empty_cache.stat().st_mode) == 0o700
+
+
+@needs_compiler
+def test_a_compiler_in_the_current_folder_is_not_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name in ("cc", "gcc", "clang"):
+        (tmp_path / name).write_text("#!/bin/sh\ntouch planted\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", os.pathsep.join([".", "", os.environ["PATH"]]))
+    find_compiler()
+    assert not (tmp_path / "planted").exists()
 
 
 @needs_compiler

@@ -302,10 +302,10 @@ def test_without_capytaine_the_message_tells_what_to_install(
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "capytaine", None)
     monkeypatch.setenv("STILLHOOK_CACHE", str(tmp_path))
-    with pytest.raises(InputError, match=r"pip install 'stillhook\[bem\]'"):
+    with pytest.raises(InputError, match=r"pip install -e '\.\[bem\]'"):
         vessel_from_hull(BOX, gm=1.5)
     (tmp_path / "box.gdf").write_text("a box\n1 9.81\n0 0\n1\n", encoding="ascii")
-    with pytest.raises(InputError, match=r"pip install 'stillhook\[bem\]'"):
+    with pytest.raises(InputError, match=r"pip install -e '\.\[bem\]'"):
         read_hull(tmp_path / "box.gdf")
 
 

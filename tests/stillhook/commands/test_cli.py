@@ -23,8 +23,10 @@ import stillhook as sh
 from models import SolverError, load_case, template_text
 from stillhook import cli
 from stillhook.commands import gains_text, parse_gains
+from stillhook.commands.working import kept_in
 from stillhook.designs import design_report
 from stillhook.text import console, progress, show, told_once
+from stillhook.text.folder import LIST
 
 THREE = ("--structure", "payload-feedback")
 THESIS = "A=200,a=50,a1=100,a2=100"
@@ -64,8 +66,8 @@ def optimised(tmp_path_factory):
 def test_optimise_ends_well_and_fills_its_folder(optimised):
     folder, done = optimised
     assert (done.returncode, done.stderr) == (0, "")
-    assert {path.suffix for path in folder.iterdir()} == {".yaml", ".md", ".svg", ".png"}
-    assert len(list(folder.iterdir())) == 11
+    assert {Path(name).suffix for name in kept_in(folder)} == {".yaml", ".md", ".svg", ".png"}
+    assert len(kept_in(folder)) == 11
     assert sh.load_design(folder / "design.yaml").ok
     assert sh.load_case(folder / "case.yaml") == load_case("thesis-1975")
 
@@ -496,7 +498,7 @@ def test_wrong_words_end_with_2_and_one_sentence(name, run):
     assert list(Path().iterdir()) == []
 
 
-@pytest.mark.parametrize("words", ["optimize x", "optimise", "optimise x --start 3", "check x y"])
+@pytest.mark.parametrize("words", ["optimice x", "optimise", "optimise x --start 3", "check x y"])
 def test_words_that_the_parser_refuses_end_with_2(words, run):
     ending = run(*words.split())
     assert (ending.status, ending.out) == (2, "")
@@ -558,13 +560,14 @@ def test_an_interrupted_search_keeps_the_case(run, monkeypatch):
         out="",
         err="stillhook: interrupted; no design was finished; kept in here: case.yaml\n",
     )
-    assert [path.name for path in Path("here").iterdir()] == ["case.yaml"]
+    assert kept_in(Path("here")) == ["case.yaml"]
     assert sh.load_case("here/case.yaml") == load_case("thesis-1975")
 
 
 def test_an_interrupted_search_says_that_other_files_are_old(run, monkeypatch):
     Path("here").mkdir()
     sh.save_design(unstable_design(), "here/design.yaml")
+    Path("here", LIST).write_text("design.yaml\n")
     old = Path("here/design.yaml").read_bytes()
 
     def interrupted(case, structure, **rest):
@@ -592,7 +595,7 @@ def test_an_interrupt_while_drawing_keeps_what_is_finished(run, handed_over, mon
     ending = run("optimise", "thesis-1975", *THREE, "--out", "here")
     assert ending.status == 130
     kept = {"case.yaml", "design.yaml", "payload_spectrum.svg", "payload_spectrum.png"}
-    assert {path.name for path in Path("here").iterdir()} == kept | {"responses.svg"}
+    assert {*kept_in(Path("here"))} == kept | {"responses.svg"}
     assert sh.load_design("here/design.yaml").gains == thesis_design().gains
     assert "the design is finished, its report is not; kept in here: case.yaml, " in ending.err
 
@@ -627,7 +630,7 @@ def test_ctrl_c_in_the_midst_of_the_search(tmp_path):
     assert out == ""
     assert err.endswith("no design was finished; kept in out/subsea-crane: case.yaml\n")
     assert "Traceback" not in err
-    assert [path.name for path in kept.parent.iterdir()] == ["case.yaml"]
+    assert kept_in(kept.parent) == ["case.yaml"]
 
 
 @pytest.mark.parametrize(

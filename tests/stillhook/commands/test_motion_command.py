@@ -13,6 +13,7 @@ from barge import barge_case
 import stillhook as sh
 from models.hook import HookMotion
 from stillhook.cli import main
+from stillhook.commands.working import kept_in
 
 
 def table(folder: Path) -> list[dict[str, str]]:
@@ -34,7 +35,7 @@ def test_a_vessel_over_headings_periods_and_sides(tmp_path, capsys, crane):
     assert "95 % below" in said
     assert "this winch can 2.24 m/s" in said
     assert max(len(line.rstrip()) for line in said.split("Written")[0].splitlines()) <= 80
-    names = {path.name for path in (tmp_path / "out").iterdir()}
+    names = {*kept_in(tmp_path / "out")}
     assert names == {
         "case.yaml", "motion.csv", "motion.svg", "motion.png", "spectra.svg", "spectra.png",
     }  # fmt: skip

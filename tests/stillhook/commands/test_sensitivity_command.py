@@ -6,6 +6,7 @@ from designs import thesis_design
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from stillhook.cli import main
+from stillhook.commands.working import kept_in
 from stillhook.designs import sensitivity_report
 from stillhook.designs.sensitivity import tornado_figure
 from stillhook.text import picture
@@ -24,7 +25,7 @@ def test_a_study_ends_well_and_fills_its_folder(tmp_path, monkeypatch, capsys, s
     assert "winch.gearbox.ratio" in said
     assert "stillhook margins thesis-1975" in said
     folder = tmp_path / "out" / "thesis-1975-sensitivity"
-    assert {p.name for p in folder.iterdir()} == {
+    assert {*kept_in(folder)} == {
         "sensitivity.csv",
         "moved.csv",
         "tornado.svg",

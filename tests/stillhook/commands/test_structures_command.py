@@ -11,6 +11,7 @@ import pytest
 import stillhook as sh
 from models.basics import InputError
 from stillhook.cli import main
+from stillhook.commands.working import kept_in
 from stillhook.designs import design_text, load_design, save_design, structures_table
 from stillhook.designs.structures import share_of, structures
 from stillhook.text import markdown, picture
@@ -106,12 +107,13 @@ def test_structures_command_compares_and_writes(
     assert status == 0
     assert "2 structures" in said
     assert "feed-forward" in said
-    written = {path.name for path in out.iterdir()}
+    written = {*kept_in(out)}
     assert {
         "case.yaml",
         "feed-forward.yaml",
         "payload-feedback.yaml",
         "structures.md",
+        "structures.png",
         "structures.svg",
     } == written
     assert load_design(out / "feed-forward.yaml").ok

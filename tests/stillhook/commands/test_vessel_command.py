@@ -11,6 +11,7 @@ from vessel_tables import shipx_text, swinging, wamit_text
 
 from models.vessel.readers import read_raos, write_raos
 from stillhook.cli import main
+from stillhook.commands.working import kept_in
 from stillhook.seas import rao_figure
 
 RAOS = swinging()
@@ -33,7 +34,7 @@ def test_import_shows_the_file_its_check_and_what_to_do_next(
     assert row.split()[-1] == "ok"
     assert "-90 deg" in row
     assert f"--set vessel.raos={out / 'raos.csv'}" in said
-    assert {path.name for path in out.iterdir()} == {"raos.csv", "raos.png", "raos.svg"}
+    assert {*kept_in(out)} == {"raos.csv", "raos.png", "raos.svg"}
     assert np.allclose(read_raos(out / "raos.csv").values, RAOS.values, rtol=1e-7)
 
 
@@ -132,7 +133,9 @@ def test_a_file_is_not_overwritten_by_its_own_import(
 ) -> None:
     file = write_raos(tmp_path / "raos.csv", RAOS)
     before = file.read_bytes()
-    assert main(["vessel", "import", str(file), "--out", str(tmp_path)]) == 2
+    assert main(["vessel", "import", str(file), "--out", str(file)]) == 2
+    assert "is the file itself" in capsys.readouterr().err
+    assert main(["vessel", "import", str(file), "--out", str(tmp_path), "--force"]) == 2
     assert "is the file itself" in capsys.readouterr().err
     assert file.read_bytes() == before
 

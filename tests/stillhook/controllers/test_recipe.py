@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -101,3 +103,17 @@ def test_a_design_is_wanted_by_laws_that_are_designed_for_every_sea_alone():
     assert CONTENDERS["none"].needs == CONTENDERS["clairvoyant"].needs == ""
     (given,) = contenders_of([thesis_design()])
     assert (given.name, given.needs, given.group) == ("design", "", "linear")
+
+
+@pytest.mark.parametrize(("entry", "portable"), [("", False), ("{here}", True)])
+def test_a_module_that_only_the_current_folder_leads_to_stays_here(
+    tmp_path, monkeypatch, entry, portable
+):
+    # Other processes do not look there, as anybody's file may lie there.
+    name = f"pilot_beside_{portable}"
+    (tmp_path / f"{name}.py").write_text("def make(case):\n    return None\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(entry.format(here=tmp_path))
+    monkeypatch.setattr(sys, "path", [entry.format(here=tmp_path), *sys.path[1:]])
+    make = importlib.import_module(name).make
+    assert recipe_of(("mine", make), "sweep").portable is portable

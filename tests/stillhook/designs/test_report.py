@@ -36,6 +36,7 @@ from stillhook.designs.summary import (
     unit_notes,
 )
 from stillhook.text import json_data, markdown
+from stillhook.text.folder import LIST
 from synth.design.tuning import LimitUse
 from synth.search import Start
 
@@ -58,7 +59,7 @@ def texts_of(table) -> list[list[str]]:
 
 
 def names(folder) -> set[str]:
-    return {path.name for path in folder.iterdir()}
+    return {path.name for path in folder.iterdir()} - {LIST}
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +117,7 @@ def quick_pictures(monkeypatch):
 def test_an_unstable_design_takes_figures_of_an_earlier_run_away(tmp_path):
     for name in ("limits.svg", "limits.png", "notes.txt"):
         (tmp_path / name).touch()
+    (tmp_path / LIST).write_text("limits.svg\nlimits.png\n")
     written = sh.write_report(tmp_path, design=unstable_design())
     assert names(tmp_path) == ALL - {"limits.svg", "limits.png"} | {"notes.txt"}
     assert len(written) == len(ALL) - 2

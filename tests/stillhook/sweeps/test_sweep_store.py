@@ -394,5 +394,5 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
 
 def test_zarr_is_an_extra(tmp_path, whole, monkeypatch):
     monkeypatch.setitem(sys.modules, "zarr", None)
-    with pytest.raises(InputError, match=r"needs zarr: pip install 'stillhook\[zarr\]'"):
+    with pytest.raises(InputError, match=r"needs zarr: run `make zarr`"):
         write_result(whole, tmp_path / "r.zarr")

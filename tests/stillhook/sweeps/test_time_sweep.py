@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
+import threading
 import warnings
 
 import numpy as np
@@ -13,12 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import stillhook as sh
-from models.basics import InputError
+from models.basics import InputError, SolverError
 from models.spread import Spread, Uniform
 from stillhook.controllers import recipe_of
 from stillhook.keeper import Cluster, Processes
 from stillhook.runs import simulate
-from stillhook.sweeps import STATUS, sweep
+from stillhook.sweeps import STATUS, SweepSummary, sweep, sweep_report, worst_cases
 from stillhook.sweeps.time_cases import CaseTask, TimeQuestion, seed_of
 from stillhook.sweeps.time_metrics import METRICS
 from stillhook.sweeps.trim import shift_between, static_of, trimmed
@@ -115,18 +117,23 @@ def test_a_process_that_is_killed_loses_nothing(alone):
 
 
 @pytest.mark.ci
-def test_a_case_that_kills_every_process_is_told_and_the_others_are_run():
+def test_a_case_that_kills_every_process_is_told_left_out_and_tried_again(tmp_path, monkeypatch):
     spread = {"payload.mass": Uniform(36e3, 44e3)}
-    found = sweep(
-        ("killer", sweep_pilots.killer),
-        spread,
-        case=CASE,
-        samples=3,
-        mode="time",
-        duration=5.0,
-        design_follows=True,
-        jobs=2,
-    )
+
+    def swept():
+        return sweep(
+            ("killer", sweep_pilots.killer),
+            spread,
+            case=CASE,
+            samples=3,
+            mode="time",
+            duration=5.0,
+            design_follows=True,
+            jobs=2,
+            store=tmp_path,
+        )
+
+    found = swept()
     heavy = found["payload.mass"].to_numpy() > 40e3
     assert 0 < heavy.sum() < 3
     died = found["status"].to_numpy() == STATUS["died"]
@@ -134,6 +141,60 @@ def test_a_case_that_kills_every_process_is_told_and_the_others_are_run():
     assert np.isnan(found["payload_rms"].to_numpy()[heavy]).all()
     assert found.attrs["complete"] == 1
     assert "its process was ended by SIGKILL, twice" in found.attrs["messages"][0]
+    # Nothing is known of it, so it is neither unstable nor among the worst.
+    summary = SweepSummary.of(found)
+    assert (summary.cases, summary.stable.total) == (3 - heavy.sum(), 3 - heavy.sum())
+    assert summary.stable.count == summary.stable.total
+    assert summary.statuses == {"died": heavy.sum()}
+    assert "left out" in summary.sentences[1]
+    assert not {*worst_cases(found, 3)} & {*found["case"].to_numpy()[heavy]}
+    assert sweep_report(found, "it").ok is False
+    # Nor is that final.
+    assert len((tmp_path / "journal.jsonl").read_text().splitlines()) == 1 + 3 - heavy.sum()
+    monkeypatch.setenv("SPARED", "1")
+    again = swept()
+    assert (again["status"] == STATUS["completed"]).all()
+    assert same(again.isel(case=~heavy), found.isel(case=~heavy)) == []
+
+
+@pytest.mark.ci
+def test_a_sweep_of_which_every_case_dies_says_so():
+    found = sweep(
+        ("killer", sweep_pilots.killer),
+        {"payload.mass": Uniform(41e3, 44e3)},
+        case=CASE,
+        samples=1,
+        mode="time",
+        duration=5.0,
+        design_follows=True,
+        engine=Processes(1),
+    )
+    with pytest.raises(SolverError, match=r"run to its end: case 0: .* ended by SIGKILL, twice"):
+        SweepSummary.of(found)
+
+
+def test_a_cluster_whose_processes_do_not_start_is_told_and_nothing_is_lost(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    del distributed
+    ended = threading.Event()
+
+    def kill() -> None:
+        while not ended.wait(0.01):
+            for child in multiprocessing.active_children():
+                child.kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with pytest.raises(InputError, match="cluster 'local:1': its processes did not start"):
+                sweep(DESIGN, SPREAD, samples=2, engine="local:1", store=tmp_path, **HOW)
+    finally:
+        ended.set()
+        killer.join()
+    found = sweep(DESIGN, SPREAD, samples=2, engine="serial", store=tmp_path, **HOW)
+    assert found.attrs["complete"] == 1
 
 
 @pytest.mark.slow  # a cluster takes its time to start
