@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from models.hook import HookDemand, HookSurvey, hook_motion
     from models.operation import RecordMotion, Scenario, SineMotion, tip_heave
     from models.run import Run
-    from models.sea import Scatter, read_scatter, read_seas
+    from models.sea import Scatter, SeaSeries, read_scatter, read_seas, read_series
     from models.spread import LogNormal, Normal, Samples, Spread, Triangular, Uniform
     from models.vessel import VesselRaos
     from models.vessel.hull import ShipLines, box_hull, read_hull, vessel_from_hull

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         heading_figure,
         scatter_figure,
     )
-    from .sea import records_report, records_table, sea_report
+    from .sea import records_report, records_table, sea_report, series_report
     from .vessel import hull_figure, hull_report, long_wave_verdict, rao_figure, rao_report
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)
