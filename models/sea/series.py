@@ -6,7 +6,7 @@ file -> `models.sea.series_files` -> account of what is no sea -> `SeaSeries` ->
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -127,6 +127,21 @@ class SeaSeries(ReadOnlyArrays):
     def month(self) -> npt.NDArray[np.int64]:
         """Month of each record, 1 to 12 (n,)."""
         return np.asarray(self.time.astype("datetime64[M]").astype(np.int64) % 12 + 1)
+
+    def of(self, keep: npt.NDArray[np.bool_], reason: str) -> SeaSeries:
+        """Return some of the records (n,); the account of the others gives the reason."""
+        left = np.flatnonzero(~keep)
+        found = Rejection(
+            reason=reason, count=left.size, example=str(self.time[left[0]]).replace("T", " ")
+        )
+        return replace(
+            self,
+            time=self.time[keep],
+            significant_height=self.significant_height[keep],
+            peak_period=self.peak_period[keep],
+            direction=None if self.direction is None else self.direction[keep],
+            quality=replace(self.quality, rejections=(*self.quality.rejections, found)),
+        )
 
     def relative(self, bow: float) -> FloatArray:
         """Return where the waves travel to, counter-clockwise from the bow (n,) [rad].

@@ -154,7 +154,7 @@ def _found(names: Sequence[str]) -> dict[str, dict[str, tuple[int, str]]]:
 
 def _stdmet(path: str) -> SeaSeries:
     """Read NDBC's standard meteorology, of a year or of the last 45 days."""
-    import pandas as pd  # type: ignore[import-untyped]
+    import pandas as pd
 
     lines = [
         (number, line.split())
@@ -201,7 +201,7 @@ def _stdmet(path: str) -> SeaSeries:
 
 def _table(path: str, place: str | None) -> SeaSeries:
     """Read a CSV file with a header."""
-    import pandas as pd  # type: ignore[import-untyped]
+    import pandas as pd
 
     text = read_text(path)
     separator = max(",;\t", key=_first_line(text.encode()).count)
@@ -273,7 +273,7 @@ def _factor(path: str, name: str, kind: str, unit: str) -> float:
 
 def _times(path: str, cells: pd.Series[Any]) -> Any:
     """Return times, UTC; NaT for those that cannot be read."""
-    import pandas as pd  # type: ignore[import-untyped]
+    import pandas as pd
 
     found = pd.to_datetime(cells, utc=True, format="ISO8601", errors="coerce")
     if len(found) and not found.notna().any():

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from models.case import Case
 
 from .capability import Capability
 from .columns import SeaColumn
 from .contour import Contour
+from .record_limits import fine_contours
 from .workable import Workable
 
 STAGES: Mapping[str, str] = {
@@ -83,6 +85,11 @@ class AtDepth:
     def length(self) -> float:
         """Rope paid out [m]."""
         return self.case.rope.length
+
+    @cached_property
+    def fine(self) -> Mapping[str, Contour]:
+        """The contours every few degrees and half a second, for seas between their points."""
+        return fine_contours(self.contours, self.columns)
 
     @property
     def main(self) -> Contour:

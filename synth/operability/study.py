@@ -22,7 +22,7 @@ from scipy.special import ndtr
 
 from models.basics import InputError, SolverError, check_ascending, check_range, one_thread
 from models.case import Case
-from models.sea import Scatter, read_scatter
+from models.sea import Scatter, SeaSeries, read_scatter
 
 from ..design import Design, limit_uses, shortfall, tuning_of
 from ..limits import Limit
@@ -35,6 +35,7 @@ from .criteria import payload_criteria
 from .depths import AtDepth, OwnSea, drum_layer
 from .limiting import HIGHEST, SeaStates, limiting_heights
 from .pose import OperabilityQuestion, pose_operability
+from .record_limits import VesselHeading, study_axes
 from .result import Operability
 from .workable import workable
 
@@ -62,8 +63,12 @@ def operability(
     payload_significant: float | str | None = None,
     payload_max: float | str | None = None,
     payload_speed: float | str | None = None,
+    daf: float | None = None,
+    snap: float | str | None = None,
     depths: Sequence[float] | None = None,
     scatter: Scatter | str | Path | None = None,
+    seas: SeaSeries | None = None,
+    vessel_heading: VesselHeading | None = None,
     reoptimise: bool = False,
     highest: float = HIGHEST,
     seed: int = 0,
@@ -92,11 +97,22 @@ def operability(
         sigma), most probable maximum amplitude in the exposure time; in m or text with a unit.
     payload_speed
         Largest most probable maximum of the payload's speed, in m/s or text with a unit.
+    daf
+        Largest dynamic amplification factor at the load's end of the rope: the most probable
+        maximum of the tension there over the load's submerged weight [-], above 1.
+    snap
+        Largest share of the load's least weight that the dynamic tension there may take up [-],
+        0 to 1 or text in %: with all of it the rope goes slack, and snaps taut.
     depths
         Lengths of rope paid out [m]; the case's own if left out.
     scatter
         Scatter diagram, its file, or ``example`` for a made-up one: what share of the year the
         work can be done.
+    seas
+        Series of seas that weather windows are to be counted in: periods and headings, unless they
+        are given, are those that reach all of them.
+    vessel_heading
+        How the vessel will lie in these.
     reoptimise
         Whether to find the gains anew for each sea as well: seconds for each point.
     highest
@@ -135,7 +151,19 @@ def operability(
         significant=payload_significant,
         maximum=payload_max,
         speed=payload_speed,
+        daf=daf,
+        snap=snap,
     )
+    if seas is not None:
+        if not has_period(case):
+            raise InputError(
+                f"{case.label}: sea: the {case.sea.spectrum} spectrum has no peak_period of its "
+                "own, so that it cannot be put into a series of seas; use jonswap"
+            )
+        reached = study_axes(case, seas, vessel_heading or VesselHeading())
+        periods = reached[0] if periods is None else periods
+        if headings is None and has_headings(case):
+            headings = reached[1]
     angles = _headings(case, headings)
     times = _periods(case, periods, diagram)
     columns = [sea_column(case, period, angles) for period in times]
@@ -160,14 +188,14 @@ def operability(
         progress("limiting seas", 0, count)
     found = []
     for stage in stages:
-        seas = [_on_rope(column, stage) for column in columns]
+        rows = [_on_rope(column, stage) for column in columns]
         contours = {
-            name: contour_of(system, stage.criteria[name], seas, highest=highest, step=step)
+            name: contour_of(system, stage.criteria[name], rows, highest=highest, step=step)
             for name, system in stage.systems.items()
         }
         if reoptimise and not isinstance(design, Case):
-            contours["reoptimised"] = _reoptimised(design, stage, seas, highest, seed, step)
-        found.append(_at_depth(stage, contours, seas, diagram, highest))
+            contours["reoptimised"] = _reoptimised(design, stage, rows, highest, seed, step)
+        found.append(_at_depth(stage, contours, rows, diagram, highest))
     return Operability(
         case=case,
         design=None if isinstance(design, Case) else design,
