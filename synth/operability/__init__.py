@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .recheck import ContourCheck
     from .record_limits import VesselHeading
     from .result import Operability
-    from .study import operability
+    from .study import example_series, operability
     from .windows import (
         HOUR,
         LEAST_WINDOWS,

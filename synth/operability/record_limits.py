@@ -6,9 +6,10 @@
 A contour at 30 degrees and one or two seconds says too little between its points: there the hook's
 motion changes by its own size.  But what a limit asks of the hook hardly changes: a motor's
 speed limit is reached at one speed of the hook, whatever heading makes it.  So each limit is
-multiplied by the hook's rms displacement, speed or acceleration in a sea of one metre, whichever
-leaves the least to interpolate; its inverse is linear between the points; and it is divided by that
-motion where it is wanted, every few degrees and half a second, where a spectrum costs little.
+multiplied by an rms in a sea of one metre, of the hook's displacement, speed or acceleration or of
+one of the system's signals with the drag of a usual sea, whichever leaves the least to interpolate;
+its inverse is linear between the points; and it is divided by that rms where it is wanted, every
+few degrees and half a second, where a spectrum costs little.
 """
 
 from __future__ import annotations
@@ -21,21 +22,22 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from models.basics import FloatArray, InputError, check_range
+from models.basics import FloatArray, InputError, Quadrature, check_range
 from models.case import Case
-from models.hook import HookMotion
 from models.sea import SeaSeries
 
 from .columns import SeaColumn, sea_column
 from .contour import Contour, heading_shares
 from .limiting import LOWEST
+from .systems import System
 
 _TURN = math.radians(5.0)  # between the headings of a fine contour, at most
 _PERIOD = 0.5  # between its periods [s], at most
 _GROWTH = 1.13  # from one period of a study's contour to the next
-_OMEGA = np.geomspace(0.08, 8.0, 600)  # at which the hook's motion is summed up [rad/s]
+_OMEGA = np.geomspace(0.08, 8.0, 1000)  # at which the hook's motion is summed up [rad/s]
 _AXIS = math.radians(30.0)  # between the headings of a study's contour
 _ORDERS = (0, 2, 4)  # moments of displacement, speed and acceleration
+_SILENT = 1e-30  # variance of a signal that does not move
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,33 +121,50 @@ def known_directions(seas: SeaSeries, heading: VesselHeading) -> SeaSeries:
     return seas if bool(np.all(keep)) else seas.of(keep, "no direction")
 
 
+def gains_of(system: System | None, contour: Contour) -> FloatArray:
+    """Return squared moduli of responses to the hook's displacement at `_OMEGA` (k, n).
+
+    Those of the hook's own displacement, speed and acceleration, then of the signals of a system,
+    if it is known, with the drag that is usual on a contour.
+    """
+    rows = [_OMEGA**order for order in _ORDERS]
+    if system is not None:
+        drag = contour.drag[np.isfinite(contour.drag)]
+        known = [float(np.median(drag)) if drag.size else system.reference]
+        known += [] if system.loss is None else [system.loss.begin]
+        nodes = Quadrature(omega=_OMEGA, weights=np.ones_like(_OMEGA))
+        rows += list(system.responses(nodes).gains(known)[:, 0])
+    return np.array(rows)
+
+
 def fine_contours(
-    contours: Mapping[str, Contour], columns: Sequence[SeaColumn]
+    contours: Mapping[str, Contour],
+    columns: Sequence[SeaColumn],
+    gains: Mapping[str, FloatArray],
 ) -> dict[str, Contour]:
     """Return contours every few degrees and half a second, as the module says.
 
-    `columns` are the seas of all of them.
+    `columns` are the seas of all of them, `gains` by name as `gains_of` has them.
     """
     first = next(iter(contours.values()))
     periods = _refined(first.periods, _PERIOD)
     angles = None if first.headings is None else _turned(first.headings)
     wanted = None if angles is None else angles.tolist()
     case = columns[0].cases[0]
-    fine = np.array([_motions(sea_column(case, float(t), wanted)) for t in periods])  # (p, h, 3)
-    coarse = np.array([_motions(column) for column in columns])
+    fine = np.array([_densities(sea_column(case, float(t), wanted)) for t in periods])  # (p, h, n)
+    coarse = np.array([_densities(column) for column in columns])
     along = np.array([np.interp(periods, first.periods, r) for r in np.eye(first.periods.size)])
     around = np.ones((1, 1)) if angles is None else heading_shares(first.headings, angles)
+
+    def rms(densities: FloatArray, name: str) -> FloatArray:
+        return np.asarray(np.sqrt(np.maximum(densities @ gains[name].T, _SILENT)))
+
     return {
         name: Contour(
             criteria=contour.criteria,
             periods=periods,
             headings=angles,
-            heights=np.array(
-                [
-                    _between(limit, coarse, fine, along, around, contour.highest)
-                    for limit in contour.heights
-                ]
-            ),
+            heights=_between(contour, rms(coarse, name), rms(fine, name), along, around),
             drag=np.full((around.shape[1], periods.size), np.nan),
             highest=contour.highest,
         )
@@ -154,21 +173,19 @@ def fine_contours(
 
 
 def _between(
-    limit: FloatArray,
-    coarse: FloatArray,
-    fine: FloatArray,
-    along: FloatArray,
-    around: FloatArray,
-    highest: float,
+    contour: Contour, coarse: FloatArray, fine: FloatArray, along: FloatArray, around: FloatArray
 ) -> FloatArray:
-    """Return a limit (h, p) on the fine axes, by the hook's motions there and here."""
-    order = _smoothest(limit, coarse)
-    # No limit is no demand, 1/inf; what is broken in a flat sea is broken in any.
-    asked = 1.0 / (np.maximum(limit, 1e-3 * LOWEST) * coarse[..., order].T)
-    inverse = (around.T @ asked @ along) * fine[..., order].T
-    found = 1.0 / np.where(inverse > 0.0, inverse, np.nan)
-    found = np.where(np.isnan(found) | (found > highest), np.inf, found)
-    return np.where(found < LOWEST, 0.0, found)
+    """Return a contour's heights on the fine axes, by rms values there and here (p, h, k)."""
+    rows = []
+    for limit in contour.heights:
+        order = _smoothest(limit, coarse)
+        # No limit is no demand, 1/inf; what is broken in a flat sea is broken in any.
+        asked = 1.0 / (np.maximum(limit, 1e-3 * LOWEST) * coarse[..., order].T)
+        inverse = (around.T @ asked @ along) * fine[..., order].T
+        found = 1.0 / np.where(inverse > 0.0, inverse, np.nan)
+        found = np.where(np.isnan(found) | (found > contour.highest), np.inf, found)
+        rows.append(np.where(found < LOWEST, 0.0, found))
+    return np.array(rows)
 
 
 def limits_at(
@@ -191,26 +208,25 @@ def limits_at(
     return each[best, rows], turned, contour.binding_at(seas.peak_period, turned)
 
 
-def _motions(column: SeaColumn) -> FloatArray:
-    """Return the hook's rms displacement, speed and acceleration per metre of H_s (h, 3)."""
-    return np.array([_rms(hook) / hook.sea.significant_height for hook in column.hooks])
+def _densities(column: SeaColumn) -> FloatArray:
+    """Return the hook's spectra per metre of H_s, with the weights of an integral (h, n)."""
+    steps = np.gradient(_OMEGA)
+    return np.array(
+        [hook.density(_OMEGA) * steps / hook.sea.significant_height**2 for hook in column.hooks]
+    )
 
 
-def _rms(hook: HookMotion) -> FloatArray:
-    density = hook.density(_OMEGA)
-    moments = [np.trapezoid(density * _OMEGA**k, _OMEGA) for k in _ORDERS]
-    return np.sqrt(np.maximum(moments, np.finfo(np.float64).tiny))
-
-
-def _smoothest(limit: FloatArray, motions: FloatArray) -> int:
-    """Return which of the hook's motions (p, h, 3) a limit (h, p) goes with best."""
-    rough = []
-    for k in range(motions.shape[-1]):
+def _smoothest(limit: FloatArray, rms: FloatArray) -> int:
+    """Return which of some rms values (p, h, k) a limit (h, p) goes with best."""
+    rough, known = [], []
+    for k in range(rms.shape[-1]):
         with np.errstate(divide="ignore", invalid="ignore"):
-            size = np.log(limit * motions[..., k].T)
+            size = np.log(limit * rms[..., k].T)
             steps = np.concatenate([np.diff(size, axis=a).ravel() for a in (0, 1)])
+        known.append(int(np.isfinite(steps).sum()) if rms[..., k].min() > 1e-12 else -1)
         rough.append(float(np.abs(steps[np.isfinite(steps)]).sum()))
-    return int(np.argmin(rough))
+    # A signal that stands still in some sea tells nothing.
+    return int(np.argmin(np.where(np.array(known) == max(known), rough, np.inf)))
 
 
 def _refined(axis: FloatArray, most: float) -> FloatArray:

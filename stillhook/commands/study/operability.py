@@ -56,7 +56,8 @@ ARGUMENTS = (
     options(
         """
         weather windows:
-        --seas FILE  H_s, T_p and direction in time (`stillhook sea FILE` tells what is read)
+        --seas FILE  H_s, T_p and direction in time (`stillhook sea FILE` tells what is read);
+            `example` is a made-up year
         --place PLACE  one place of a file that has several, as LAT,LON of a grid
         --duration TIME  planned time of the operation T_POP, as in 12h
         --contingency TIME  contingency T_C (default: T_POP); the window T_R = T_POP + T_C is 72 h
@@ -170,12 +171,15 @@ def _asked(arguments: argparse.Namespace) -> tuple[VesselHeading | None, SeaSeri
     if arguments.duration is None:
         raise InputError("operability: --seas needs --duration, the planned time, as in 12h")
     from models.sea import read_series
-    from synth.operability import alpha_factor, window_times
+    from synth.operability import alpha_factor, example_series, window_times
 
     planned, _ = window_times(arguments.duration, arguments.contingency)
     alpha_factor(arguments.alpha or 1.0, planned, arguments.forecast_level)
     rule = _heading(arguments.heading)
-    seas = read_series(arguments.seas, place=arguments.place)
+    if arguments.seas == "example":
+        seas = example_series()
+    else:
+        seas = read_series(arguments.seas, place=arguments.place)
     if rule.bow is not None:
         seas.relative(rule.bow)
     return rule, seas
@@ -214,6 +218,8 @@ def _next(
     if arguments.seas is None and study.scatter is None:
         again = f"stillhook operability {words}{design} --scatter example"
         rows.append(("how much of a (made-up) year is workable", again))
+        again = f"stillhook operability {words}{design} --seas example --duration 12h"
+        rows.append(("how long one waits for a window of (made-up) weather", again))
     if len(study.depths) == 1:
         length = study.case.rope.length
         again = f"--depths {0.25 * length:.4g},{0.5 * length:.4g},{length:.4g}"
