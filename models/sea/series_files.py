@@ -287,11 +287,13 @@ def _times(path: str, cells: pd.Series[Any]) -> Any:
 def _chosen(path: str, place: str | None, held: Sequence[str]) -> str:
     if place in held:
         return str(place)
-    shown = ", ".join(held[:6]) + (", .." if len(held) > 6 else "")
     if place is None and len(held) == 1:
         return held[0]
+    if list(held) == [""]:
+        raise InputError(f"{path}: is of one place, so that none can be chosen; got {place!r}")
+    shown = ", ".join(held[:6]) + (", .." if len(held) > 6 else "")
     came = "none was named" if place is None else f"got {place!r}"
-    raise InputError(f"{path}: place must be one of {shown or 'none: it has one only'}; {came}")
+    raise InputError(f"{path}: place must be one of {shown}; {came}")
 
 
 def _opened(path: str) -> xr.Dataset:

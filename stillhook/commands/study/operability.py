@@ -47,7 +47,7 @@ ARGUMENTS = (
         --payload-speed SPEED  most probable maximum of its speed, as in '0.5 m/s'
         --daf RATIO  largest dynamic amplification factor at the load's end of the rope, as in 1.3
         --snap SHARE  largest share of the load's weight that the dynamic tension there may take up
-            before the rope is slack and snaps taut, as in 90%
+            before the rope is slack and snaps taut, as in 0.9
         """,
         tp=axis(1.0),
         headings=axis(30.0),

@@ -135,6 +135,9 @@ def test_windows_and_waits_are_those_of_counting_by_hand(seed: int, needed: int)
     whole = found.whole("held")
     spans = seas.spans / HOUR
     assert whole.workable == pytest.approx(spans @ (seas.significant_height <= 1.0) / spans.sum())
+    inside = sum(end - begin for begin, end in windows)
+    assert whole.inside == pytest.approx(inside / spans.sum())
+    assert whole.inside < whole.workable  # some times are too short
     assert whole.count == len(windows)
     lengths = np.diff(windows, axis=1)
     assert (whole.mean_length, whole.longest) == pytest.approx(
@@ -452,7 +455,7 @@ def test_tables_and_figures_show_what_was_counted() -> None:
 
 def test_the_end_at_the_load_has_its_own_criteria() -> None:
     case = load_case("subsea-crane")
-    daf, snap = payload_criteria(case, daf=1.3, snap="90 %")
+    daf, snap = payload_criteria(case, daf=1.3, snap="90%")
     assert (daf.name, daf.bound) == ("rope.lower_tension.daf", 1.3)
     assert snap.bound == pytest.approx(case.payload.taut_tension)
     study = operability(thesis_design(), periods=[8.0, 11.0], daf=1.019, snap=0.02)
@@ -540,7 +543,7 @@ def test_the_command_counts_windows(
         ([*told, "--contingency", "70 h"], "must be at most 72 h, got 6 h + 70 h = 76 h"),
         ([*told, "--heading", "20+-10"], "vessel: has no headings"),
         ([*told, "--alpha", "alpha.csv"], "forecast level must be one of A, B; got none"),
-        ([*told, "--place", "1,2"], "place must be one of none: it has one only; got '1,2'"),
+        ([*told, "--place", "1,2"], "is of one place, so that none can be chosen; got '1,2'"),
         (["--daf", "0.9"], "--daf must be in (1, 10]"),
     ):
         assert main([*words, *extra]) == 2
