@@ -16,7 +16,7 @@ PIP_INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check -c const
 # Each writes its rows, then its pages and figures; those that only draw come after.
 STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline headline_page landing saturation \
     random_starts robust structures comparison structures_page said_structures said_mpc \
-    operability_figures hook_motion sea_figures)) \
+    operability_figures windows_figures hook_motion sea_figures)) \
     benchmarks/sweep.py
 
 .DEFAULT_GOAL := help

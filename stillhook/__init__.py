@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from models.hook import HookDemand, HookSurvey, hook_motion
     from models.operation import RecordMotion, Scenario, SineMotion, tip_heave
     from models.run import Run
-    from models.sea import Scatter, read_scatter, read_seas
+    from models.sea import Scatter, SeaSeries, read_scatter, read_seas, read_series
     from models.spread import LogNormal, Normal, Samples, Spread, Triangular, Uniform
     from models.vessel import VesselRaos
     from models.vessel.hull import ShipLines, box_hull, read_hull, vessel_from_hull
@@ -44,7 +44,13 @@ if TYPE_CHECKING:
     from synth.bound import BestPossible, Bound, bound_for, exact_sensors
     from synth.controllers import BrakeOn, ConstantTension, LinearFeedback, VelocityFeedForward
     from synth.design import Design, Look, View, evaluate_gains, optimise_gains, prepare, tune
-    from synth.operability import Operability, operability
+    from synth.operability import (
+        Operability,
+        VesselHeading,
+        WeatherWindows,
+        operability,
+        weather_windows,
+    )
     from synth.robust import Family, Robustness, optimise_robust, robustness, schedule_gains
     from synth.sensitivity import Sensitivity, morris_screening, sensitivity, sobol_indices
     from synth.sizing import co_design, pareto_front, size_winch, worth
@@ -52,6 +58,7 @@ if TYPE_CHECKING:
     from .comparison import Comparison, compare, write_comparison
     from .designs import load_design, save_design, write_report
     from .runs import Runs, simulate, write_runs
+    from .seas import load_windows, save_windows
     from .sweeps import fault_spread, resume_sweep, sweep, usual_spread
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

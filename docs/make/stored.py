@@ -37,6 +37,7 @@ SCRIPTS: Mapping[str, str] = {
     "said_mpc.csv": "docs/make/said_mpc.py",
     "said_operability.csv": "docs/make/operability_figures.py",
     "said_structures.csv": "docs/make/said_structures.py",
+    "said_windows.csv": "docs/make/windows_figures.py",
     "saturation.csv": "docs/make/saturation.py",
     "sea_reading.csv": "benchmarks/sea_reading.py",
     "simulation.csv": "benchmarks/simulation.py",

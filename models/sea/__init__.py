@@ -1,7 +1,7 @@
-"""Seas: spectra of the surface elevation, spreading, records of buoys, scatter diagrams.
+"""Seas: spectra of the surface elevation, spreading, records, series in time, scatter diagrams.
 
-The sea of a case file, a file of measured spectra or a scatter diagram comes in; spectra, their
-statistics and the shares of the sea states go out.
+The sea of a case file, a file of measured spectra, of sea states in time or a scatter diagram comes
+in; spectra, their statistics, series and the shares of the sea states go out.
 """
 
 from typing import TYPE_CHECKING
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from .scatter_files import read_scatter, write_scatter
     from .sea import SeaSpectrum
     from .sea_section import Sea
+    from .series import LONGEST_GAP, SeaSeries, relative_heading
+    from .series_files import holds_series, read_series
     from .shapes import breaking_steepness
     from .spreading import Spreading
 else:

@@ -33,6 +33,7 @@ from .ndbc import is_ndbc, read_ndbc
 from .quality import QualityControl, RawRecords, TimeArray, sift
 from .scatter import Scatter
 from .sea import SeaSpectrum
+from .series import SeaSeries, relative_heading
 from .table import MOST_ROWS
 
 _EXTENSIONS = {".spt": "datawell", ".oct": "octopus", ".mat": "xwaves"}
@@ -46,7 +47,7 @@ class SeaRecords:
     --------
     >>> records = SeaRecords.from_arrays([0.05, 0.1, 0.2, 0.3], [[0.0, 5.0, 1.0, 0.2]])
     >>> round(float(records.significant_height[0]), 2), round(float(records.peak_period[0]), 1)
-    (2.79, 10.0)
+    (2.79, 7.8)
     >>> round(records.sea(0, beyond="zero").statistics.significant_height, 2)
     2.79
     """
@@ -145,9 +146,12 @@ class SeaRecords:
 
     @property
     def peak_period(self) -> FloatArray:
-        """T_p, of each record's highest frequency (n,) [s]."""
-        peak = self.omega[np.argmax(self.density, axis=1)]
-        return np.asarray(2.0 * math.pi / np.where(peak > 0.0, peak, 0.5 * self.omega[1]))
+        """T_p (n,) [s], between the frequencies of the file.
+
+        Of the parabola through each record's highest density and its neighbours, which stays within
+        half a bin of it.  The bins alone would leave whole classes of T_p without a sea.
+        """
+        return np.asarray(2.0 * math.pi / _peaks(self.omega, self.density))
 
     @property
     def zero_crossing_period(self) -> FloatArray:
@@ -167,6 +171,31 @@ class SeaRecords:
         if not 0 <= record <= last:
             raise InputError(f"record must be in [0, {last}] in {self.source}, got {record}")
         return SeaSpectrum.from_table(self.omega, self.density[record], beyond=beyond)
+
+    def series(self, place: str | None = None) -> SeaSeries:
+        """Return H_s, T_p and direction in time, of one place where the file has several.
+
+        Raises InputError if there are several places and none of them is named, or no times.
+        """
+        keep = np.ones(len(self), dtype=np.bool_)
+        if self.place or place is not None:
+            names = list(dict.fromkeys(self.place))
+            if place is not None or len(names) > 1:
+                check_choice(self.source, "place", place, names)
+                keep = np.array([name == place for name in self.place])
+        if np.all(np.isnat(self.time)):
+            raise InputError(f"{self.source}: has no times for a series of seas")
+        found = SeaSeries.from_arrays(
+            self.time[keep],
+            self.significant_height[keep],
+            self.peak_period[keep],
+            None if self.direction is None else self.direction[keep],
+            rejections=self.quality.rejections,
+            notes=self.quality.notes,
+            source=self.source,
+            file_format=self.file_format,
+        )
+        return found
 
     def scatter(
         self,
@@ -188,8 +217,7 @@ class SeaRecords:
             bow = check_range("scatter diagram", "vessel_heading", vessel_heading, unit="rad")
             if self.direction is None or np.any(np.isnan(self.direction)):
                 raise InputError(f"{self.source}: has no directions for a vessel_heading")
-            # Compass bearings run clockwise, headings relative to the bow counter-clockwise.
-            heading = np.mod(bow - (self.direction + math.pi), 2.0 * math.pi)
+            heading = relative_heading(bow, self.direction)
         month: npt.NDArray[Any] | None = None
         if not np.any(np.isnat(self.time)):
             month = self.time.astype("datetime64[M]").astype(np.int64) % 12 + 1
@@ -202,6 +230,21 @@ class SeaRecords:
             period_step=period_step,
             source=self.source,
         )
+
+
+def _peaks(omega: FloatArray, density: FloatArray) -> FloatArray:
+    """Return the frequency of each record's peak (n,) [rad/s]: the vertex of a parabola."""
+    top = np.argmax(density, axis=1)
+    rows, inner = np.arange(len(density)), np.clip(top, 1, omega.size - 2)
+    left, at, right = omega[inner - 1], omega[inner], omega[inner + 1]
+    low, high, next_ = (density[rows, inner + k] for k in (-1, 0, 1))
+    rising, falling = (high - low) / (at - left), (next_ - high) / (right - at)
+    bend = falling - rising  # at most zero at a peak
+    turned = np.where(bend < 0.0, bend, -1.0)
+    vertex = 0.5 * (left + at) - 0.5 * rising * (right - left) / turned
+    # At an end of the table, and where three densities are one, there is nothing to fit.
+    peak = np.where((top == inner) & (bend < 0.0), vertex, omega[top])
+    return np.asarray(np.where(peak > 0.0, peak, 0.5 * omega[1]))
 
 
 def read_seas(path: str | Path, *, file_format: str | None = None) -> SeaRecords:

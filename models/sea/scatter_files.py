@@ -1,6 +1,7 @@
 """Scatter diagrams as CSV files: a list of states or a matrix, read and written."""
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,6 +30,12 @@ _KINDS = {
     "heading": "angle",
 }
 _RANGE = re.compile(r"^\s*([0-9]*\.?[0-9]+)\s*(?:-|\u2013|to|\.\.)\s*([0-9]*\.?[0-9]+)\s*$")
+# A class without an end: `<1`, `<= 1`, `below 1`, or `>6`, `>= 6`, `over 6`, `6+`.
+_BELOW = re.compile(r"^\s*(?:<=?|\u2264|below|under|up to)\s*([0-9]*\.?[0-9]+)\s*$", re.IGNORECASE)
+_ABOVE = re.compile(
+    r"^\s*(?:(?:>=?|\u2265|above|over)\s*([0-9]*\.?[0-9]+)|([0-9]*\.?[0-9]+)\s*\+)\s*$",
+    re.IGNORECASE,
+)
 _MOST_ROWS = 200_000
 
 
@@ -46,10 +53,11 @@ def read_scatter(path: str | Path, *, gamma: float = 1.0) -> Scatter:
         1.5, 6.5, 2380
 
     A matrix has heights down and periods across, or the other way about, and its corner says
-    which.  Classes are given by their centres or as ranges::
+    which.  Classes are given by their centres or as ranges, and the outermost may be open, as `<1`
+    and `>6`: they are taken to be as wide as their neighbours, and no lower than zero::
 
-        H_s [m] \ T_z [s], 4-5, 5-6, 6-7
-        0-1, 120, 310, 85
+        H_s [m] \ T_z [s], 4-5, 5-6, >6
+        <1, 120, 310, 85
         1-2, 14, 402, 516
 
     Separators are commas, semicolons (then with decimal commas, if the file has them) or tabs;
@@ -187,13 +195,22 @@ def _list(
     factors = {
         name: _factor(name, named[index][1], f"{owner}:{line}") for name, index in at.items()
     }
-    columns: dict[str, list[float]] = {name: [] for name in at}
+    texts: dict[str, list[str]] = {name: [] for name in at}
     for number, cells in body:
         if len(cells) <= max(at.values()):
             raise InputError(f"{owner}:{number}: must have {len(header)} columns, got {len(cells)}")
         for name, index in at.items():
-            value = check_range(f"{owner}:{number}", name, cells[index])
-            columns[name].append(value * factors[name])
+            texts[name].append(cells[index])
+    lines = [number for number, _ in body]
+    columns: dict[str, list[float]] = {}
+    for name, column in texts.items():
+        if any(_BELOW.match(cell) or _ABOVE.match(cell) for cell in column):
+            values = _centres(column, owner, lines, name)
+        else:
+            values = [
+                check_range(f"{owner}:{n}", name, c) for n, c in zip(lines, column, strict=True)
+            ]
+        columns[name] = [value * factors[name] for value in values]
     return {name: np.array(values) for name, values in columns.items()}
 
 
@@ -219,11 +236,9 @@ def _matrix(
 ) -> dict[str, Any]:
     (down_name, down_unit), (across_name, across_unit) = (_name(part) for part in corner)
     across = [cell for cell in across if cell.lower() not in ("", "sum", "total", "all")]
-    columns = [
-        _centre(cell, owner, line) * _factor(across_name, across_unit, f"{owner}:{line}")
-        for cell in across
-    ]
-    down, table = [], []
+    factor = _factor(across_name, across_unit, f"{owner}:{line}")
+    columns = [factor * c for c in _centres(across, owner, [line] * len(across))]
+    heads, table = [], []
     for number, cells in body:
         if cells[0].lower() in ("sum", "total", "all"):
             continue
@@ -231,9 +246,7 @@ def _matrix(
             raise InputError(
                 f"{owner}:{number}: must have {len(columns)} occurrences, got {len(cells) - 1}"
             )
-        down.append(
-            _centre(cells[0], owner, number) * _factor(down_name, down_unit, f"{owner}:{number}")
-        )
+        heads.append((number, cells[0]))
         # An empty cell of a diagram is one that never occurs.
         table.append(
             [
@@ -243,14 +256,51 @@ def _matrix(
         )
     if not table or not columns:
         raise InputError(f"{owner}: the matrix must have at least one row and one column")
-    rows, cols = np.meshgrid(down, columns, indexing="ij")
+    factor = _factor(down_name, down_unit, f"{owner}:{heads[0][0]}")
+    found = _centres([cell for _, cell in heads], owner, [number for number, _ in heads])
+    rows, cols = np.meshgrid([factor * c for c in found], columns, indexing="ij")
     by_name = {down_name: rows, across_name: cols, "occurrence": np.array(table)}
     return {name: values.ravel() for name, values in by_name.items()}
 
 
-def _centre(cell: str, owner: str, line: int) -> float:
-    """Return the centre of a class, given as itself or as a range."""
-    match = _RANGE.match(cell)
-    if match:
-        return 0.5 * (float(match.group(1)) + float(match.group(2)))
-    return check_range(f"{owner}:{line}", "a class of the matrix", cell)
+def _centres(
+    cells: Sequence[str], owner: str, lines: Sequence[int], what: str = "a class of the matrix"
+) -> list[float]:
+    """Return the centres of classes, given as themselves, as ranges or open at one end."""
+    closed: list[tuple[float, float]] = []  # of each that has two ends, its centre and its width
+    centres, open_ = [], []
+    for k, (cell, line) in enumerate(zip(cells, lines, strict=True)):
+        ranged, below, above = _RANGE.match(cell), _BELOW.match(cell), _ABOVE.match(cell)
+        centres.append(math.nan)
+        if below or above:
+            edge = float(below.group(1)) if below else float(next(filter(None, above.groups())))  # type: ignore[union-attr]
+            open_.append((k, edge, below is not None))
+            continue
+        if ranged:
+            low, high = float(ranged.group(1)), float(ranged.group(2))
+            closed.append((0.5 * (low + high), high - low))
+        else:
+            value = check_range(f"{owner}:{line}", what, cell)
+            closed.append((value, math.nan))
+        centres[-1] = closed[-1][0]
+    for k, edge, downward in open_:
+        # A class without an end is as wide as the next one; none begins below zero.
+        width = min(edge, _width(closed, edge)) if downward else _width(closed, edge)
+        if math.isnan(width):
+            raise InputError(
+                f"{owner}:{lines[k]}: the open class {cells[k]!r} must have a class beside it that "
+                "says how wide it is"
+            )
+        centres[k] = edge + (-0.5 if downward else 0.5) * width
+    return centres
+
+
+def _width(closed: Sequence[tuple[float, float]], edge: float) -> float:
+    """Return the width of the class nearest an edge; NaN where nothing tells it."""
+    near = sorted(set(closed), key=lambda one: abs(one[0] - edge))
+    if not near:
+        return math.nan
+    centre, width = near[0]
+    if math.isnan(width):  # told by the centres
+        width = min((abs(c - centre) for c, _ in closed if c != centre), default=math.nan)
+    return width

@@ -32,8 +32,9 @@ from .operability_figures import (
 if TYPE_CHECKING:
     import xarray as xr
 
-_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-_WHO = {"held": "drum held", "loop": "design", "reoptimised": "anew", "perfect": "perfect"}
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+WHO = {"held": "drum held", "loop": "design", "reoptimised": "anew", "perfect": "perfect"}
+"""The systems, as tables call them."""
 _ROWS = 20
 FIGURES = ("contour", "capability", "headings", "depths", "scatter")
 """Names of the figures, of which a study has some."""
@@ -81,7 +82,7 @@ def workable_table(study: Operability) -> Table:
         for at in study.depths
         for name, share in at.workable.items()
     ]
-    return data_table([*head, *_MONTHS], rows)
+    return data_table([*head, *MONTHS], rows)
 
 
 def netcdf(dataset: xr.Dataset) -> bytes:
@@ -110,10 +111,10 @@ def _drawings(study: Operability) -> list[Drawing]:
 
 
 def _contours(at: AtDepth) -> Table:
-    names = [n for n in _WHO if n in at.contours]
+    names = [n for n in WHO if n in at.contours]
     heads = [Column("peak_period", "T_p", write=lambda period: f"{period:.3g} s")]
     for name in names:
-        heads += columns(f"{name}={_WHO[name]}; {name}_set_by=set by <")
+        heads += columns(f"{name}={WHO[name]}; {name}_set_by=set by <")
     rows = []
     for p, period in enumerate(at.main.periods):
         rows.append((float(period), *(c for n in names for c in _cells(at.contours[n], p))))
@@ -137,7 +138,7 @@ def _plain(name: str) -> str:
 
 def _shares(study: Operability) -> list[Item]:
     first = study.depths[0]
-    names = [n for n in _WHO if n in first.workable]
+    names = [n for n in WHO if n in first.workable]
     rows: list[tuple[float | str, ...]] = []
     for at in study.depths:
         lost = at.workable["loop" if "loop" in names else "held"].binding
@@ -148,7 +149,7 @@ def _shares(study: Operability) -> list[Item]:
             rows.append(("  best heading", *best, ""))
     heads = (
         Column("rope", write=lambda length: f"{length:g} m"),
-        *(Column(n, _WHO[n], write=percent) for n in names),
+        *(Column(n, WHO[n], write=percent) for n in names),
         *columns("lost to <"),
     )
     outside = first.workable["held"].outside
@@ -159,11 +160,11 @@ def _shares(study: Operability) -> list[Item]:
     if months:
         known = sorted(next(iter(months.values())))
         shares = [
-            (_WHO[n], *(months[n][m] for m in known))
+            (WHO[n], *(months[n][m] for m in known))
             for n in ("held", "loop", "reoptimised")
             if n in months
         ]
-        each = [Column(_MONTHS[m - 1], write=lambda v: f"{100.0 * v:.0f}") for m in known]
+        each = [Column(MONTHS[m - 1], write=lambda v: f"{100.0 * v:.0f}") for m in known]
         note = f"% of each month with {first.length:g} m of rope"
         items.append(Table(columns=(Column("system", ""), *each), rows=shares, notes=(note,)))
     heads = columns("operation=rules of thumb, 1975 thesis, Table 2; safe [%]; or marginal [%]")

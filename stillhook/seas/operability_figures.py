@@ -45,6 +45,8 @@ _LINES: dict[str, tuple[str, Any]] = {
     "rope.tension.peak": ("#444444", "-"),
     "rope.tension.least": ("#444444", (0, (5, 2))),
     "rope.lower_tension.least": ("#444444", (0, (1, 1.2))),
+    "rope.lower_tension.daf": ("#8c564b", "-"),
+    "rope.lower_tension.snap": ("#8c564b", (0, (5, 2))),
     "stability": ("#000000", (0, (1, 1))),
 }
 _STEEP = "#9a9a9a"
@@ -65,7 +67,12 @@ def _label(name: str) -> str:
     """Return a criterion in words."""
     if name in LIMITS:
         return LIMITS[name][0]
-    own = {"stability": "stability", "payload.speed": "payload speed"}
+    own = {
+        "stability": "stability",
+        "payload.speed": "payload speed",
+        "rope.lower_tension.daf": "DAF at the load",
+        "rope.lower_tension.snap": "snap: tension at the load",
+    }
     return own.get(name, "payload motion")
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.sea import Scatter, SeaRecords, SeaSpectrum
+from models.basics import FloatArray
+from models.sea import LONGEST_GAP, Scatter, SeaRecords, SeaSeries, SeaSpectrum
 
 from ..text import (
     AFTER,
@@ -22,6 +23,7 @@ from ..text import (
     columns,
     data_table,
     drawn,
+    duration,
     headline,
     pairs,
     panel,
@@ -152,17 +154,76 @@ def records_report(
     )
 
 
-def records_table(records: SeaRecords) -> Table:
+@drawn
+def series_figure(series: SeaSeries, *, name: str) -> Figure:
+    """Return H_s and T_p over time; gaps of more than three hours stay empty."""
+    figure, axes = panel(9.2, 4.2)
+    axes.remove()
+    above, below = figure.subplots(2, 1, sharex=True)
+    gaps = np.flatnonzero(np.diff(series.time).astype(np.float64) > LONGEST_GAP) + 1
+    time = np.insert(series.time, gaps, np.datetime64("NaT"))
+    for panel_, values, colour, label in (
+        (above, series.significant_height, AFTER, "H_s [m]"),
+        (below, series.peak_period, HOOK, "T_p [s]"),
+    ):
+        panel_.plot(time, np.insert(values, gaps, np.nan), color=colour, linewidth=0.8)
+        panel_.set_ylim(bottom=0.0)
+        panel_.set_ylabel(typeset(label))
+    above.set_xlim(series.time[0], series.time[-1])
+    top = int(np.argmax(series.significant_height))
+    day = str(series.time[top]).partition("T")[0]
+    height = quantity(float(series.significant_height[top]), "m")
+    return headline(
+        figure, f"H_s up to {height} on {day}, T_p {series.peak_period[top]:.3g} s", name
+    )
+
+
+def series_report(series: SeaSeries, *, name: str, steps: Mapping[str, float]) -> Report:
+    """Return what a file of sea states in time holds: its account, statistics, figures.
+
+    `steps` are widths of classes, as `scatter_figure` takes them.
+    """
+    file = f"{Path(name).name}: {len(series)} records"
+    drawings = [
+        Drawing("series", "H_s and T_p in time", lambda: series_figure(series, name=file)),
+        Drawing(
+            "scatter",
+            "Scatter diagram",
+            lambda: scatter_figure(series.scatter(**steps), name=file, **steps),
+        ),
+    ]
+    first, last = (str(time).replace("T", " ") for time in series.time[[0, -1]])
+    known = series.direction is not None and bool(np.isfinite(series.direction).any())
+    facts: list[Item] = [
+        f"{first} to {last} UTC, a record every {duration(series.usual_step)}, directions "
+        f"{'known' if known else 'unknown'}",
+        _summary(("H_s [m]", series.significant_height), ("T_p [s]", series.peak_period)),
+    ]
+    return Report(
+        name=name,
+        about=series.file_format,
+        status=str(series.quality),
+        sections=[
+            ReportSection("", [_quality(series)]),
+            ReportSection("", [*facts, *drawings]),
+        ],
+    )
+
+
+def records_table(records: SeaRecords | SeaSeries) -> Table:
     """Return the records as data."""
     rows = []
+    crossing, place = np.full(len(records), np.nan), tuple[str, ...]()
+    if isinstance(records, SeaRecords):
+        crossing, place = records.zero_crossing_period, records.place
     for k in range(len(records)):
         bearing = math.nan if records.direction is None else math.degrees(records.direction[k])
-        figures = (records.significant_height, records.peak_period, records.zero_crossing_period)
+        figures = (records.significant_height, records.peak_period, crossing)
         rows.append(
             (
                 k,
                 "" if np.isnat(records.time[k]) else str(records.time[k]),
-                records.place[k] if records.place else "",
+                place[k] if place else "",
                 *(float(values[k]) for values in figures),
                 None if math.isnan(bearing) else round(bearing, 1),
             )
@@ -178,7 +239,7 @@ def _when(records: SeaRecords, index: int) -> str:
     return f"{text}{place}"
 
 
-def _quality(records: SeaRecords) -> Table:
+def _quality(records: SeaRecords | SeaSeries) -> Table:
     quality = records.quality
     rows: list[tuple[str, int, str]] = [("read", quality.read, "")]
     rows += [(f"rejected: {one.reason}", one.count, one.example) for one in quality.rejections]
@@ -197,15 +258,20 @@ def _statistics(records: SeaRecords) -> list[Item]:
             f"{first} to {last} UTC, {records.omega.size} frequencies from {low:.3g} to "
             f"{high:.3g} Hz"
         )
+    table = _summary(
+        ("H_s [m]", records.significant_height),
+        ("T_p [s]", records.peak_period),
+        ("T_z [s]", records.zero_crossing_period),
+    )
+    return [*items, table]
+
+
+def _summary(*quantities: tuple[str, FloatArray]) -> Table:
     rows = [
         (label, *(float(f(values)) for f in (np.mean, np.min, np.median, np.max)))
-        for label, values in (
-            ("H_s [m]", records.significant_height),
-            ("T_p [s]", records.peak_period),
-            ("T_z [s]", records.zero_crossing_period),
-        )
+        for label, values in quantities
     ]
-    return [*items, Table(columns=columns("quantity=; mean; lowest; median; highest"), rows=rows)]
+    return Table(columns=columns("quantity=; mean; lowest; median; highest"), rows=rows)
 
 
 def _facts(sea: SeaSpectrum) -> list[tuple[str, str]]:

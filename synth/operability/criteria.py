@@ -16,7 +16,7 @@ from models.basics import InputError, check_range, parse_quantity
 from models.case import Case
 from models.plant import LinearPlant
 
-from ..limits import PAYLOAD, Limit, Minimum, Peak, Rms, Symbols, drive_limits
+from ..limits import LOWER_TENSION, PAYLOAD, Limit, Minimum, Peak, Rms, Symbols, drive_limits
 
 if TYPE_CHECKING:
     from ..loop import Assessment
@@ -35,6 +35,17 @@ class Significant(Rms):
     @override
     def measure(self, loop: Assessment) -> float:
         return 4.0 * super().measure(loop)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Amplification(Peak):
+    """(static + k sigma)/static of `output` at most `bound`: the dynamic amplification factor."""
+
+    kind: ClassVar[str] = "daf"
+
+    @override
+    def measure(self, loop: Assessment | Symbols) -> Any:
+        return super().measure(loop) / self.static
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +71,17 @@ def payload_criteria(
     significant: float | str | None = None,
     maximum: float | str | None = None,
     speed: float | str | None = None,
+    daf: float | None = None,
+    snap: float | str | None = None,
 ) -> tuple[Limit, ...]:
-    """Return how still the payload must be held, as criteria.
+    """Return how still the payload must be held, and how evenly its rope loaded, as criteria.
 
     The largest standard deviation, significant double amplitude (4 sigma) and largest amplitude of
     its motion in the case's exposure time are in metres, or text with a unit; its largest velocity
-    in that time is in m/s or text with a unit.
+    in that time is in m/s or text with a unit.  `daf` is the largest tension at the load's end in
+    that time over the load's submerged weight [-]; `snap` the share of its least weight up to
+    which the dynamic tension there may go before the rope is slack and snaps taut, a number or text
+    in %.
 
     Raises InputError if a value is not above zero, or has another unit.
     """
@@ -90,6 +106,19 @@ def payload_criteria(
         if value is not None:
             bound, name = read(f"payload_{end}", value, quantity, unit), f"payload.{end}"
             found.append(Peak(bound=bound, output=output, duration=time, unit=unit, name=name))
+    load, end = case.payload, LOWER_TENSION
+    if daf is not None:
+        bound = check_range("operability", "daf", daf, low=1.0, high=10.0, open_low=True)
+        weight = load.submerged_weight
+        found.append(Amplification(bound=bound, output=end, static=weight, duration=time))
+    if snap is not None:
+        share = read("snap", snap, "ratio", "")
+        check_range("operability", "snap", share, high=1.0)
+        lightest, name = load.least_weight, f"{end}.snap"
+        least = (1.0 - share) * lightest
+        found.append(
+            Minimum(bound=least, output=end, static=lightest, duration=time, unit="N", name=name)
+        )
     return tuple(found)
 
 

@@ -3,12 +3,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
+from models.basics import FloatArray
 from models.case import Case
 
 from .capability import Capability
 from .columns import SeaColumn
 from .contour import Contour
+from .record_limits import fine_contours
 from .workable import Workable
 
 STAGES: Mapping[str, str] = {
@@ -61,6 +64,8 @@ class AtDepth:
     #: and ``reoptimised`` where it was asked for.
     contours: Mapping[str, Contour]
     columns: tuple[SeaColumn, ...]  #: The seas, one column for each period.
+    #: Gains of the systems' signals by name, with which `fine` goes between the seas.
+    gains: Mapping[str, FloatArray]
     capability: Capability  #: The maker's lines: what the winch can follow in regular heave.
     #: Shares of the year by name of the system; empty without a scatter diagram.
     workable: Mapping[str, Workable]
@@ -83,6 +88,11 @@ class AtDepth:
     def length(self) -> float:
         """Rope paid out [m]."""
         return self.case.rope.length
+
+    @cached_property
+    def fine(self) -> Mapping[str, Contour]:
+        """The contours every few degrees and half a second, for seas between their points."""
+        return fine_contours(self.contours, self.columns, self.gains)
 
     @property
     def main(self) -> Contour:

@@ -18,11 +18,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 from scipy.special import ndtr
 
 from models.basics import InputError, SolverError, check_ascending, check_range, one_thread
 from models.case import Case
-from models.sea import Scatter, read_scatter
+from models.sea import Scatter, SeaSeries, read_scatter
 
 from ..design import Design, limit_uses, shortfall, tuning_of
 from ..limits import Limit
@@ -35,6 +36,7 @@ from .criteria import payload_criteria
 from .depths import AtDepth, OwnSea, drum_layer
 from .limiting import HIGHEST, SeaStates, limiting_heights
 from .pose import OperabilityQuestion, pose_operability
+from .record_limits import VesselHeading, gains_of, study_axes
 from .result import Operability
 from .workable import workable
 
@@ -43,6 +45,7 @@ _DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 _WEIBULL_SHAPE = 1.5  # of the Weibull distribution [-]
 _CLASS_HEIGHTS = np.arange(0.0, 12.5, 0.5)  # edges of the classes [m]
 _CLASS_PERIODS = np.arange(3.0, 20.5, 1.0)  # edges [s]
+_MEMORY = (30.0, 12.0, 24.0)  # of H_s, T_p and direction of the example's year [h]
 _LEAST_SHARE = 1e-6  # share of a month below which a class is left out
 _PERIODS = (4.0, 18.0, 15)  # first, last and number of the default periods
 _STEP = 30.0  # deg between the default headings
@@ -62,8 +65,12 @@ def operability(
     payload_significant: float | str | None = None,
     payload_max: float | str | None = None,
     payload_speed: float | str | None = None,
+    daf: float | None = None,
+    snap: float | str | None = None,
     depths: Sequence[float] | None = None,
     scatter: Scatter | str | Path | None = None,
+    seas: SeaSeries | None = None,
+    vessel_heading: VesselHeading | None = None,
     reoptimise: bool = False,
     highest: float = HIGHEST,
     seed: int = 0,
@@ -92,11 +99,22 @@ def operability(
         sigma), most probable maximum amplitude in the exposure time; in m or text with a unit.
     payload_speed
         Largest most probable maximum of the payload's speed, in m/s or text with a unit.
+    daf
+        Largest dynamic amplification factor at the load's end of the rope: the most probable
+        maximum of the tension there over the load's submerged weight [-], above 1.
+    snap
+        Largest share of the load's least weight that the dynamic tension there may take up [-],
+        0 to 1 or text in %: with all of it the rope goes slack, and snaps taut.
     depths
         Lengths of rope paid out [m]; the case's own if left out.
     scatter
         Scatter diagram, its file, or ``example`` for a made-up one: what share of the year the
         work can be done.
+    seas
+        Series of seas that weather windows are to be counted in: periods and headings, unless they
+        are given, are those that reach all of them.
+    vessel_heading
+        How the vessel will lie in these.
     reoptimise
         Whether to find the gains anew for each sea as well: seconds for each point.
     highest
@@ -135,7 +153,19 @@ def operability(
         significant=payload_significant,
         maximum=payload_max,
         speed=payload_speed,
+        daf=daf,
+        snap=snap,
     )
+    if seas is not None:
+        if not has_period(case):
+            raise InputError(
+                f"{case.label}: sea: the {case.sea.spectrum} spectrum has no peak_period of its "
+                "own, so that it cannot be put into a series of seas; use jonswap"
+            )
+        reached = study_axes(case, seas, vessel_heading or VesselHeading())
+        periods = reached[0] if periods is None else periods
+        if headings is None and has_headings(case):
+            headings = reached[1]
     angles = _headings(case, headings)
     times = _periods(case, periods, diagram)
     columns = [sea_column(case, period, angles) for period in times]
@@ -160,14 +190,14 @@ def operability(
         progress("limiting seas", 0, count)
     found = []
     for stage in stages:
-        seas = [_on_rope(column, stage) for column in columns]
+        rows = [_on_rope(column, stage) for column in columns]
         contours = {
-            name: contour_of(system, stage.criteria[name], seas, highest=highest, step=step)
+            name: contour_of(system, stage.criteria[name], rows, highest=highest, step=step)
             for name, system in stage.systems.items()
         }
         if reoptimise and not isinstance(design, Case):
-            contours["reoptimised"] = _reoptimised(design, stage, seas, highest, seed, step)
-        found.append(_at_depth(stage, contours, seas, diagram, highest))
+            contours["reoptimised"] = _reoptimised(design, stage, rows, highest, seed, step)
+        found.append(_at_depth(stage, contours, rows, diagram, highest))
     return Operability(
         case=case,
         design=None if isinstance(design, Case) else design,
@@ -252,6 +282,7 @@ def _at_depth(
         layers=layers,
         contours=contours,
         columns=tuple(columns),
+        gains={n: gains_of(question.systems.get(n), contour) for n, contour in contours.items()},
         capability=capability(question.perfect, question.criteria["perfect"], lines),
         workable=shares,
         own=_own_sea(question, highest),
@@ -309,6 +340,36 @@ def example_scatter() -> Scatter:
         occurrence=shares[month, height, period] * np.array(_DAYS)[month],
         month=month + 1,
         source="made-up example site",
+    )
+
+
+def example_series() -> SeaSeries:
+    """Return a made-up year of hourly seas at the site of `example_scatter`.
+
+    H_s of each month has the same distribution, T_p the same about the same mean; both change as
+    slowly as weather does, by processes of first order with 30 and 12 hours, and the waves come
+    from the west.  It is one year of many that could be made so.
+    """
+    hours = np.arange(8760)
+    rng = np.random.default_rng(1975)
+    steps = rng.standard_normal((3, hours.size))
+    slow = np.empty_like(steps)
+    for row, (step, decay) in enumerate(zip(steps, np.exp(-1.0 / np.array(_MEMORY)), strict=True)):
+        slow[row] = lfilter([math.sqrt(1.0 - decay**2)], [1.0, -decay], step)
+    time = np.datetime64("2021-01-01T00", "s") + hours * np.timedelta64(3600, "s")
+    # Scales of the months' middles, and between them as the year goes round.
+    day = hours / 24.0
+    middles = np.cumsum(_DAYS) - 0.5 * np.array(_DAYS)
+    scale = np.interp(day, middles, _SCALES, period=365.0)
+    heights = np.maximum(scale * (-np.log(ndtr(-slow[0]))) ** (1.0 / _WEIBULL_SHAPE), 0.1)
+    mean = np.log(6.0 + 1.3 * heights**0.8)
+    spread = 0.12 + 0.14 * np.exp(-0.35 * heights)
+    return SeaSeries.from_arrays(
+        time,
+        np.round(heights, 2),
+        np.round(np.exp(mean + spread * slow[1]), 1),
+        np.radians(np.round(270.0 + 40.0 * slow[2])),
+        source="made-up example year",
     )
 
 

@@ -11,7 +11,7 @@ import pytest
 import said
 
 DOCS = Path(__file__).parents[2] / "docs"
-SCRIPTS = ("said_structures", "said_mpc", "operability_figures")
+SCRIPTS = ("said_structures", "said_mpc", "operability_figures", "windows_figures")
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

@@ -173,3 +173,32 @@ def test_damaged_files_are_told_in_our_words(tmp_path, seed):
         except InputError:
             continue
         assert site.occurrence.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Hs \\ Tp,<5,5-7,7-9,>9\n<1,1,2,3,4\n1-2,5,6,7,8\n>2,9,10,11,12\n",
+        "Hs \\ Tp,up to 5,6,8,9+\nbelow 1,1,2,3,4\n1.5,5,6,7,8\n>= 2,9,10,11,12\n",
+    ],
+)
+def test_open_classes_are_as_wide_as_their_neighbours(tmp_path, text):
+    if "1.5" in text:
+        # One centre alone does not say how wide its class is.
+        with pytest.raises(InputError, match="the open class '>= 2' must have a class beside"):
+            read_scatter(written(tmp_path, text))
+        text = text.replace("\n1.5", "\n1-2")
+    site = read_scatter(written(tmp_path, text))
+    assert sorted(set(site.significant_height)) == [0.5, 1.5, 2.5]
+    assert sorted(set(site.peak_period)) == [4.0, 6.0, 8.0, 10.0]
+    assert site.total == 78.0
+
+
+def test_open_classes_in_a_list(tmp_path):
+    text = "H_s [cm],T_p,n\n<100,6,1\n100-300,6,1\n>300,>8,1\n300-500,6-8,1\n"
+    site = read_scatter(written(tmp_path, text))
+    # The lowest class does not reach below a flat sea.
+    assert site.significant_height.tolist() == pytest.approx([0.5, 2.0, 4.0, 4.0])
+    assert site.peak_period.tolist() == [6.0, 6.0, 9.0, 7.0]
+    with pytest.raises(InputError, match="peak_period must be a finite number, got '<x'"):
+        read_scatter(written(tmp_path, "H_s,T_p,n\n1,<x,1\n"))
