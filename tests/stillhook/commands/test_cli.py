@@ -356,7 +356,7 @@ WRONG_FILES = {
     ),
     "zero period": (
         ("significant_period: 8.1", "significant_period: 0"),
-        r"my\.yaml:\d+: sea\.significant_period: must be a time in \(0, 60\] s, got 0",
+        r"my\.yaml:\d+: sea\.significant_period: must be a time in \[0.5, 60\] s, got 0",
     ),
     "not a number": (
         ("length: 2000.0", "length: .nan"),

@@ -235,7 +235,7 @@ WRONG = {
     "its case": (
         r"(?m)^    significant_height: .*$",
         "    significant_height: -1",
-        r"d\.yaml:\d+: sea\.significant_height: must be a length in \(0, 30\] m, got -1",
+        r"d\.yaml:\d+: sea\.significant_height: must be a length in \[0.001, 30\] m, got -1",
     ),
     "another format": (
         r"(?m)^stillhook_design: 2$",

@@ -120,6 +120,6 @@ def test_a_figure_that_cannot_be_drawn_takes_an_older_one_away(tmp_path):
     def nothing():
         raise InputError("there is nothing to show")
 
-    (tmp_path / "curve.svg").touch()
+    OutputFolder.prepare(tmp_path).write("curve.svg", "")
     assert OutputFolder.prepare(tmp_path).draw([Drawing("curve", "", nothing)]) == []
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == [".stillhook"]
