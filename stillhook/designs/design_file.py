@@ -15,6 +15,7 @@ import os
 import types
 import typing
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin
 
@@ -145,9 +146,11 @@ def _of_format_1(data: dict[str, Any], reader: _Reader, *, structure: bool) -> d
             raise reader.error(("gains",), "is missing")
         fields["parameters"] = fields.pop("gains")
         return {"structure": "payload-feedback", "units": {}, "shares": {}, **fields}
-    if fields.get("parameters") and str(fields.get("structure")).startswith("payload-feedback"):
+    given = fields.get("parameters")
+    of_gains = str(fields.get("structure")).startswith("payload-feedback")
+    if of_gains and given and isinstance(given, Mapping):
         own = case.gains.A if case.gains is not None else 1.0
-        fields["parameters"] = {"A": own, **fields["parameters"]}
+        fields["parameters"] = {"A": own, **given}
     fields["shares"] = {PAYLOAD: fields.pop("parts", {})}
     fields["significant_height"] = case.sea.significant_height
     # It kept the number of starts only.
@@ -256,9 +259,11 @@ class _Reader:
         return data
 
     def number(self, data: Any, place: Place) -> float:
-        if isinstance(data, bool) or not isinstance(data, int | float) or math.isnan(data):
-            raise self.error(place, f"must be a number, got {_got(data)}")
-        return float(data)
+        if isinstance(data, int | float) and not isinstance(data, bool):
+            with suppress(OverflowError):  # an integer of more digits than a number has
+                if not math.isnan(found := float(data)):
+                    return found
+        raise self.error(place, f"must be a number, got {_got(data)}")
 
 
 def _got(data: Any) -> str:

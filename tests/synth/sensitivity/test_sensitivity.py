@@ -93,7 +93,10 @@ def test_numbers_without_effect_have_none(study):
     view = figures(study._fixed.assessment())
     for path in study.without_effect:
         other = study._fixed.with_number(path, 1.01)
-        assert other is None or figures(other.assessment()) == pytest.approx(view, abs=1e-9), path
+        assert other is None or figures(other.assessment()) == pytest.approx(
+            view,
+            abs=5e-9,  # rounding of other processors' kernels, 1.3e-9 seen
+        ), path
 
 
 def test_every_number_of_the_case_is_in_one_of_the_two_lists(study):
