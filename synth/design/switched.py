@@ -218,14 +218,19 @@ def swing(share: float, gaussian: float) -> float:
     return float(brentq(lambda x: fallen(x) - lasting, 0.0, 3.0 * gaussian)) / gaussian
 
 
-def _crest(responses: ComplexArray) -> FloatArray:
+def image_frequencies(lines: FloatArray, hold: float) -> FloatArray:
+    """Return where lines (l,) come again below and above multiples of 2 pi/hold, (2 i l,)."""
+    about = 2.0 * math.pi / hold * np.arange(1, _IMAGES + 1)[:, np.newaxis]
+    return np.stack([about - lines, about + lines]).ravel()
+
+
+def crest(responses: ComplexArray) -> FloatArray:
     """Return by how much each signal's images are more than on average, where they are most, (o,).
 
     They follow a step of the readings and have died down before the next: a Gaussian number once
-    a reading.  The responses (o, k) are to those of `_LINES` frequencies below and above each of
-    `_IMAGES` multiples of the rate.
+    a reading.  The responses (o, k) are at `image_frequencies`.
     """
-    below, above = np.split(responses.reshape(-1, _IMAGES, 2 * _LINES), 2, axis=-1)
+    below, above = responses.reshape(len(responses), 2, _IMAGES, -1).swapaxes(0, 1)
     turn = np.exp(2j * np.pi * np.outer(np.arange(1, _IMAGES + 1), np.arange(64) / 64))
     each = np.einsum("okl,kt->olt", above, turn) + np.einsum("okl,kt->olt", below, turn).conj()
     power = np.sum(np.abs(each) ** 2, axis=1)
@@ -311,17 +316,11 @@ class SwitchedLoop:
         outputs = self.loop.plant.outputs
         if not any(element.lasting for element in self.loop.elements):
             return np.zeros(len(outputs))
-        nodes = self.loop.quadrature(outputs)
-        densities = np.stack([self._density(i, nodes.omega) for i in range(len(self._names))])
+        nodes, densities, still = self._shaken
+        dragged = self.dragged.responses(outputs, self._names, nodes.omega, losses=False)
         now, then = (
-            nodes.integrate(
-                np.sum(
-                    np.abs(loop.responses(outputs, self._names, nodes.omega, losses=False)) ** 2
-                    * densities,
-                    axis=1,
-                )
-            )
-            for loop in (self.loop, self.dragged)
+            nodes.integrate(np.sum(np.abs(responses) ** 2 * densities, axis=1))
+            for responses in (still, dragged)
         )
         return np.asarray(np.clip(np.log(now / then) / math.log(DRAG_STEP), 0.0, 1.0))
 
@@ -367,22 +366,17 @@ class SwitchedLoop:
 
         Responses as the loop moves, and of the loop without losses, with images at their most.
         """
-        outputs = self.loop.plant.outputs
-        nodes = self.loop.quadrature(outputs)
+        outputs, (nodes, densities, still) = self.loop.plant.outputs, self._shaken
         omega = nodes.omega
-        densities = np.stack(
-            [np.broadcast_to(self._density(i, omega), omega.shape) for i in range(len(self._names))]
-        )
         responses = self.loop.responses(outputs, self._names, omega)
         density = np.sum(np.abs(responses) ** 2 * densities, axis=1)
-        still = self.loop.responses(outputs, self._names, omega, losses=False)
         found = [(omega, nodes.weights, densities, responses, still)]
         for name, omega, shares in self._images(nodes, dict(zip(outputs, density, strict=True))):
             # They stand where the first of the sources does, which has nothing there.
             from_readings = self.loop.responses(outputs, [name], omega)
             others = len(self._names) - 1
             heard = np.pad(from_readings, ((0, 0), (0, others), (0, 0)))
-            most = heard * _crest(from_readings[:, 0])[:, np.newaxis, np.newaxis]
+            most = heard * crest(from_readings[:, 0])[:, np.newaxis, np.newaxis]
             shares = np.pad(shares[np.newaxis], ((0, others), (0, 0)))
             found.append((omega, np.ones_like(omega), shares, heard, most))
         omega, weights, densities, responses, still = (
@@ -391,6 +385,17 @@ class SwitchedLoop:
         order = np.argsort(omega)
         nodes = Quadrature(omega=omega[order], weights=weights[order])
         return nodes, densities[:, order], responses[:, :, order], still[:, :, order]
+
+    @cached_property
+    def _shaken(self) -> tuple[Quadrature, FloatArray, ComplexArray]:
+        """The loop's own nodes, densities there, and responses without losses (o, w, k)."""
+        outputs = self.loop.plant.outputs
+        nodes = self.loop.quadrature(outputs)
+        omega = nodes.omega
+        densities = np.stack(
+            [np.broadcast_to(self._density(i, omega), omega.shape) for i in range(len(self._names))]
+        )
+        return nodes, densities, self.loop.responses(outputs, self._names, omega, losses=False)
 
     def _images(
         self, nodes: Quadrature, density: Mapping[str, FloatArray]
@@ -406,8 +411,7 @@ class SwitchedLoop:
             shares = np.cumsum(density[name] * nodes.weights * (nodes.omega < math.pi / hold))
             each = (np.arange(_LINES) + 0.5) / _LINES * shares[-1]
             lines = nodes.omega[np.searchsorted(shares, each)]
-            about = 2.0 * math.pi / hold * np.arange(1, _IMAGES + 1)[:, np.newaxis]
-            omega = np.concatenate([about - lines, about + lines]).ravel()
+            omega = image_frequencies(lines, hold)
             yield f"{name}_noise", omega, np.full(omega.size, shares[-1] / _LINES)
 
     def _density(self, index: int, omega: FloatArray) -> FloatArray:

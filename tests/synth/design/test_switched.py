@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from models.basics import Quadrature
-from synth.design.switched import _IMAGES, _LINES, SwitchedSignal, _crest, swing
+from synth.design.switched import SwitchedSignal, crest, image_frequencies, swing
 
 _PEAK, _WIDE = 0.8, 0.25  # of the disturbance's density [rad/s]
 _LAG = 0.5  # of the loop's answer to a loss [s]
@@ -125,12 +125,10 @@ def test_images_are_most_where_a_staircase_of_lagged_readings_jumps():
     twice = lfilter([1.0 - keep], [1.0, -keep], once)
     power = np.mean(((once - twice) / lag).reshape(-1, count)[10:] ** 2, axis=0)
 
-    about = 2.0 * math.pi / hold * np.arange(1, _IMAGES + 1)[:, np.newaxis]
-    lines = np.full(_LINES, slow)
-    omega = np.concatenate([about - lines, about + lines], axis=1).ravel()
+    omega = image_frequencies(np.full(12, slow), hold)
     half = 0.5 * omega * hold
     held = np.sin(half) / half * np.exp(-1j * half)
-    (found,) = _crest((held * 1j * omega / (1.0 + 1j * omega * lag) ** 2)[np.newaxis])
+    (found,) = crest((held * 1j * omega / (1.0 + 1j * omega * lag) ** 2)[np.newaxis])
     assert found == pytest.approx(math.sqrt(power.max() / power.mean()), rel=0.03)
 
 
