@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...basics import FloatArray, InputError, check_range, wave_number
+from ...basics import ComplexArray, FloatArray, InputError, check_range, wave_number
 from ..assemble import finished, grid, numbers
 from ..convention import Convention, one_of
 from ..raos import VesselRaos
@@ -102,15 +102,36 @@ def parse_wamit(
             f"{owner}: the first column must be in (1e-6, 1e6) s or rad/s, got {first:g} to "
             f"{last:g}"
         )
+    return vessel_of(
+        owner, rows, scaled, convention,
+        origin=origin, phase_origin=origin[:2], depth=depth, notes=notes,
+    )  # fmt: skip
+
+
+def vessel_of(
+    owner: str,
+    rows: FloatArray,
+    values: ComplexArray,
+    convention: Convention,
+    *,
+    origin: tuple[float, float, float],
+    phase_origin: tuple[float, float],
+    depth: float,
+    notes: list[str],
+) -> VesselRaos:
+    """Return the RAOs of rows (n, 3 or more) of wave, heading and mode, with a value each (n,).
+
+    Raises InputError if a mode is missing or a row stands twice.
+    """
     omega, heading, table = six_modes(
-        owner, convention.omega(rows[:, 0]), rows[:, 1], modes, scaled
+        owner, convention.omega(rows[:, 0]), rows[:, 1], rows[:, 2].astype(int), values
     )
     motions = convention.complex_values(table, wave_number(omega, depth))
     w, b, found = grid(owner, omega, convention.directions(heading), motions)
     return finished(
         VesselRaos(
             name=Path(owner).stem, omega=w, heading=b, values=found, origin=origin,
-            phase_origin=origin[:2], depth=depth, source=owner, notes=tuple(notes),
+            phase_origin=phase_origin, depth=depth, source=owner, notes=tuple(notes),
         )
     )  # fmt: skip
 

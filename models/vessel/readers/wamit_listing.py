@@ -7,15 +7,13 @@ whole degree: a `.4` file of the same run has more digits.  Convention as in
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 
-from ...basics import FloatArray, InputError, wave_number
-from ..assemble import finished, grid
+from ...basics import FloatArray, InputError
 from ..convention import Convention
 from ..raos import VesselRaos
-from .wamit import of_body, six_modes
+from .wamit import of_body, vessel_of
 
 _MARK = re.compile(r"WAMIT\s+Version")
 _PERIOD = re.compile(r"^\s*Wave period(?: \(sec\))? =\s*(\S+)")
@@ -58,17 +56,9 @@ def parse_wamit_listing(owner: str, text: str, *, body: int | None = None) -> Ve
     angles = np.where(modes > 3, length, 1.0)
     turned = np.exp(1j * np.radians(rows[:, 4]))
     values = np.asarray(rows[:, 3] / angles * turned, dtype=np.complex128)
-    convention = Convention(waves="period (s)")
-    omega, heading, table = six_modes(
-        owner, convention.omega(rows[:, 0]), rows[:, 1], modes, values
-    )
-    motions = convention.complex_values(table, wave_number(omega, depth))
-    w, b, found = grid(owner, omega, convention.directions(heading), motions)
-    return finished(
-        VesselRaos(
-            name=Path(owner).stem, omega=w, heading=b, values=found, origin=(0.0, 0.0, z),
-            phase_origin=(-x, -y), depth=depth, source=owner, notes=tuple(notes),
-        )
+    return vessel_of(
+        owner, rows, values, Convention(waves="period (s)"),
+        origin=(0.0, 0.0, z), phase_origin=(-x, -y), depth=depth, notes=notes,
     )  # fmt: skip
 
 
