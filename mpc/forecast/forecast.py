@@ -7,7 +7,8 @@ know which predictor stands behind it: `AdaptiveAR` (knows the record alone), `P
 (knows the future, for reference) or one of the user's own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy as np
 from models.basics import FloatArray, check_range, read_only
 
 _MOST_LEADS = 100_000
-_FADING = 1.0  # [s], in which what a shorter forecast has put right is forgotten beyond its end
+# [s], in which what a shorter forecast has put right, or a better start, is forgotten beyond it.
+_FADING = 1.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,6 +34,19 @@ class Forecast:
     velocity: FloatArray
     displacement_std: FloatArray
     velocity_std: FloatArray
+
+    def begun_at(self, displacement: float, velocity: float, sample_time: float) -> "Forecast":
+        """Return this forecast with another motion now [m], [m/s], of which it loses sight.
+
+        A filter's errors of the hook and of the load belong together: the rope between them is
+        known well.  A forecast that begins elsewhere stretches the rope by the difference.
+        """
+        fading = _fading(self.displacement.size, sample_time)
+        return replace(
+            self,
+            displacement=self.displacement + (displacement - self.displacement[0]) * fading,
+            velocity=self.velocity + (velocity - self.velocity[0]) * fading,
+        )
 
 
 @runtime_checkable
@@ -68,6 +83,12 @@ def leads_of(owner: str, sample_time: float, horizon: float) -> FloatArray:
     step = check_range(owner, "sample_time", sample_time, low=0.0, unit="s", open_low=True)
     last = check_range(owner, "horizon", horizon, low=0.0, high=_MOST_LEADS * step, unit="s")
     return read_only(step * np.arange(round(last / step) + 1))
+
+
+@lru_cache(maxsize=8)
+def _fading(size: int, sample_time: float) -> FloatArray:
+    """Return what is left of a start after so many samples, (size,)."""
+    return read_only(np.exp(-sample_time / _FADING * np.arange(size)))
 
 
 def fused(own: Forecast, other: Forecast, sample_time: float) -> Forecast:

@@ -66,7 +66,7 @@ from .winch_programme import winch_programme
 _OWNER = "predictive control"
 _CLEAR = 1.5 * SPEED_BAND  # of the highest speed, kept clear of the drive's own overspeed cut
 _HORIZON, _PREVIEWED = 8.0, 14.0  # [s]
-_SWELL = 0.2  # reckoned with though not told, of the hook's variance
+_SWELL = 0.05  # reckoned with though not told, of the hook's variance
 _PROVED = 1e-6  # residual of the optimality conditions
 _STALE = 1.0  # of a plan [s]
 _UNIT, _TORQUE = HEARD.index("mru.valid"), HEARD.index("motor.torque")
@@ -334,12 +334,15 @@ class WinchMPC(ABC):
         heave, rate, valid = float(shown[_HEAVE]), float(shown[_RATE]), bool(shown[_UNIT] > 0.5)
         if self.preview is not None:
             self.preview.update(heave, rate, valid, time)
-        if getattr(self.predictor, "fused", False):
+        of_filter = getattr(self.predictor, "fused", False)
+        if of_filter:
             at = self.model.sea_at
             heave, rate = (self._shows @ self.estimator.state[at]).tolist()
             valid = not self.estimator.blind
         self.predictor.update(heave, rate, valid, time)
         own = self.predictor.forecast()
+        if of_filter:
+            own = own.begun_at(heave, rate, self.sample_time)
         if self.preview is None:
             return own
         return fused(own, self.preview.forecast(), self.sample_time)

@@ -7,6 +7,7 @@ import pytest
 from mpc_cases import WEIGHTS, case_of, controller_of
 from sea_records import TS
 
+from models import load_case
 from models.hook import HookMotion
 from models.operation import SpectrumMotion
 from mpc.forecast import Forecast, PerfectPreview, SeaBank, fused
@@ -130,6 +131,17 @@ def test_two_forecasts_are_weighed_by_their_variances_and_the_shorter_one_fades_
     assert both.displacement_std[-1] > 1.99
 
 
+def test_a_forecast_that_is_to_begin_elsewhere_forgets_it_within_seconds():
+    ones = np.ones(101)
+    found = Forecast(2.0 * ones, -1.0 * ones, ones, 3.0 * ones).begun_at(3.0, 1.0, 0.05)
+    assert (found.displacement[0], found.velocity[0]) == (3.0, 1.0)
+    assert found.displacement[20] - 2.0 == pytest.approx(np.exp(-1.0))
+    assert found.velocity[20] + 1.0 == pytest.approx(2.0 * np.exp(-1.0))
+    assert abs(found.displacement[-1] - 2.0) < 0.01
+    np.testing.assert_array_equal(found.displacement_std, ones)
+    np.testing.assert_array_equal(found.velocity_std, 3.0 * ones)
+
+
 def rms_of(run, begin):
     return float(np.sqrt((run["payload.displacement"][run.time > begin] ** 2).mean()))
 
@@ -161,6 +173,18 @@ def test_a_unit_that_drifts_in_the_sea_as_told_is_taken_for_no_other_sea():
     assert controller.counts["misfit"] == 0
     assert controller.predictor.fit > 0.5
     assert rms_of(run, 30.0) < 0.03
+
+
+@pytest.mark.parametrize("name", ["landing", "subsea-crane"])
+def test_in_the_sea_as_told_it_costs_next_to_nothing_on_a_unit_that_errs_slowly(name):
+    case, weights = load_case(name), WEIGHTS["subsea-crane"]
+    left = []
+    for predictor in ("bank", "kalman"):
+        controller = LinearMPC(case, weights=weights, predictor=predictor)
+        runs = simulate(case, controller, seeds=range(4), duration=120.0)
+        left.append(np.sqrt(np.mean([rms_of(run, 15.0) ** 2 for run in runs])))
+    # A path that begins elsewhere than the filter's hook costs a fifth of the first minutes.
+    assert left[0] < 1.06 * left[1]
 
 
 def test_a_preview_of_two_seconds_is_fused_and_who_has_the_record_is_named_so():
