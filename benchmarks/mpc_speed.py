@@ -135,9 +135,14 @@ def recorded(
     kind: type[LinearMPC] = LinearMPC,
     settle: float = 40.0,
 ) -> Recording:
-    """Return a recording of a controller with or without move blocking."""
+    """Return a recording of a controller with or without move blocking.
+
+    The peers' problem has the filter's own sea in its model, and so has what is recorded.
+    """
     blocking = None if blocked else (1,) * round(horizon / SAMPLE_TIME)
-    controller = kind(sea_case(sea), weights=WEIGHTS, horizon=horizon, blocking=blocking)
+    controller = kind(
+        sea_case(sea), weights=WEIGHTS, horizon=horizon, blocking=blocking, predictor="kalman"
+    )
     return record(sea, controller, steps=steps, settle=settle)
 
 

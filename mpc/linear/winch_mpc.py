@@ -149,7 +149,7 @@ class WinchMPC(ABC):
         sample_time: float = 0.05,
         blocking: Sequence[int] | None = None,
         weights: Weights | None = None,
-        predictor: Literal["bank", "kalman", "ar", "preview"] | Predictor = "kalman",
+        predictor: Literal["bank", "kalman", "ar", "preview"] | Predictor = "bank",
         preview: Predictor | None = None,
         masses: int | None = None,
         minimum_tension: float | None = None,

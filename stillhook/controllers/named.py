@@ -34,7 +34,7 @@ CONTROLLER_TEXTS: Mapping[str, str] = MappingProxyType(
         "feed-forward-lead": "0.9 of it, with the delays of sensor and drive made up for",
         "constant-tension": "the drive keeps the rope's tension within a dead band",
         "none": "the drum held by its brake",
-        "mpc": "linear MPC, the hook predicted by a Kalman filter",
+        "mpc": "linear MPC, the hook foretold by the sea that is told and by others",
         "mpc-clipped": "the same filter and law without limits, cut off at the drive's",
         "mpc-ar": "linear MPC, the hook predicted by an adaptive AR model",
         "mpc-preview": "linear MPC that is told the hook's future, for reference",

@@ -84,7 +84,7 @@ def simulated_cost(controller: LinearMPC, chi: np.ndarray, v: np.ndarray) -> tup
 
 @pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
 def test_programme_is_the_cost_of_stepping_the_model(name):
-    controller = controller_of(name, horizon=2.0)
+    controller = controller_of(name, horizon=2.0, predictor="kalman")
     rng = np.random.default_rng(0)
     chi = state_of(controller, rng, 1.0)
     (f, lower, _), _, _ = question_of(controller, chi)
@@ -105,7 +105,7 @@ def test_programme_is_the_cost_of_stepping_the_model(name):
 
 
 def test_gradient_and_hessian_agree_with_finite_differences_of_the_cost():
-    controller = controller_of("thesis-1975", horizon=1.0)
+    controller = controller_of("thesis-1975", horizon=1.0, predictor="kalman")
     chi = state_of(controller, np.random.default_rng(1), 1.0)
     (f, _, _), _, _ = question_of(controller, chi)
     n = len(f)
@@ -122,7 +122,7 @@ def test_gradient_and_hessian_agree_with_finite_differences_of_the_cost():
 
 @pytest.mark.parametrize("name", ["thesis-1975", "thesis-1975-rope", "subsea-crane"])
 def test_without_active_limits_it_is_the_linear_quadratic_regulator(name):
-    controller = controller_of(name, horizon=3.0, blocking=(1,) * 60)
+    controller = controller_of(name, horizon=3.0, blocking=(1,) * 60, predictor="kalman")
     rng = np.random.default_rng(2)
     for _ in range(20):
         chi = 1e-3 * state_of(controller, rng, 0.1)
@@ -155,7 +155,9 @@ def _compare_with_oracle(name: str, *, states: int, horizon: float) -> None:
     of our answer 1e-5 where the moves are right to 1e-7.
     """
     weights = WEIGHTS.get(name, WEIGHTS["subsea-crane"])
-    controller = LinearMPC(models.load_case(name), weights=weights, horizon=horizon)
+    controller = LinearMPC(
+        models.load_case(name), weights=weights, horizon=horizon, predictor="kalman"
+    )
     plain, model = oracle(controller), controller.model
     p, winch = controller.programme, model.winch
     rng = np.random.default_rng(3)
@@ -226,7 +228,7 @@ def test_cold_and_warm_starts_agree():
 
 
 def test_the_path_tells_the_state_of_the_sea_at_its_end():
-    controller = controller_of("thesis-1975")
+    controller = controller_of("thesis-1975", predictor="kalman")
     model = controller.model
     rng = np.random.default_rng(6)
     over = model.A[model.sea_at, model.sea_at]

@@ -221,7 +221,9 @@ def test_without_nonlinearities_it_is_the_linear_controller(name: str) -> None:
 
 def test_condensed_linearisation_is_the_slope_of_a_simulation(thesis: sh.Case) -> None:
     """Outputs of moves that are a little different, sample by sample through `advanced`."""
-    controller = NonlinearMPC(thesis, weights=WEIGHTS, horizon=3.0, minimum_tension=0.0)
+    controller = NonlinearMPC(
+        thesis, weights=WEIGHTS, horizon=3.0, minimum_tension=0.0, predictor="kalman"
+    )
     chi, p, stage = a_sea(controller, 1.0, 5), controller.programme, controller.stage
     moves = controller.optimise(chi)
     model, n = controller.model, stage.winch.size
@@ -261,7 +263,9 @@ def test_condensed_linearisation_is_the_slope_of_a_simulation(thesis: sh.Case) -
 )
 def test_converged_iterations_are_ipopts_answer(name: str, seed: int, size: float) -> None:
     case = load_case(name)
-    controller = NonlinearMPC(case, weights=WEIGHTS, horizon=2.0, masses=1, minimum_tension=0.0)
+    controller = NonlinearMPC(
+        case, weights=WEIGHTS, horizon=2.0, masses=1, minimum_tension=0.0, predictor="kalman"
+    )
     chi = a_sea(controller, size, seed)
     moves = controller.optimise(chi)
     answer = nlp_oracle(controller, chi)
@@ -278,7 +282,9 @@ def test_converged_iterations_are_ipopts_answer(name: str, seed: int, size: floa
 def test_converged_iterations_are_ipopts_answer_with_a_slack_rope(
     thesis: sh.Case, seed: int, size: float, rising: float
 ) -> None:
-    controller = NonlinearMPC(thesis, weights=WEIGHTS, horizon=2.0, minimum_tension=0.0)
+    controller = NonlinearMPC(
+        thesis, weights=WEIGHTS, horizon=2.0, minimum_tension=0.0, predictor="kalman"
+    )
     chi, states = a_sea(controller, size, seed), controller.model.winch.plant.states
     chi[states.index("payload.displacement")] += 6.0  # more than the static stretch
     chi[states.index("payload.velocity")] += rising

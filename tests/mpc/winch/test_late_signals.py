@@ -77,7 +77,9 @@ def test_the_unsaturated_controller_is_the_regulator_of_late_commands(
     name: str, delay: float
 ) -> None:
     weights = WEIGHTS[name]
-    controller = LinearMPC(late_case(name, delay), weights=weights, horizon=3.0, blocking=(1,) * 60)
+    controller = LinearMPC(
+        late_case(name, delay), weights=weights, horizon=3.0, blocking=(1,) * 60, predictor="kalman"
+    )
     model, rng = controller.model, np.random.default_rng(2)
     chi = np.zeros(model.size)
     n = model.winch.size
