@@ -11,7 +11,9 @@ import ast
 import gc
 import hashlib
 import platform
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -30,7 +32,8 @@ def code_digest(entry: Callable[..., object] | str) -> str:
     That is the file of the function and every file that it imports, directly or through others,
     within the toolkit (and the function's own package): at the top or later, in a function.  What
     is imported for type checkers alone cannot change a number and does not count.  A face
-    (`models.basics.lazy`) is looked through to the file that a name comes from.  Of each file the
+    (`models.basics.lazy`) is looked through to the file that a name comes from, also where it is
+    imported whole and only its names are used (``import stillhook as sh``).  Of each file the
     syntax tree without its docstrings counts, so that words, comments and line breaks may change;
     and so do the versions of the numerical libraries.
     """
@@ -73,18 +76,28 @@ class _Reached:
             path = self._file(module)
             if module in self.contents or path is None:
                 continue
-            self.contents[module], imports = _contents(path, path.stat().st_mtime_ns)
+            file = _contents(path, path.stat().st_mtime_ns)
+            self.contents[module] = file.digest
             # That relative imports start from.
             package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-            for line in imports:
-                todo += self._targets(line, package)
+            for line in file.imports:
+                todo += self._targets(line, package, file.used)
             if path.name == "__init__.py":  # imported as a whole: all that it hands on
                 todo += [self._source(*home) for home in self._face(module, path).values()]
 
-    def _targets(self, line: ast.Import | ast.ImportFrom, package: str) -> Iterator[str]:
+    def _targets(
+        self, line: ast.Import | ast.ImportFrom, package: str, used: Mapping[str, frozenset[str]]
+    ) -> Iterator[str]:
         """Yield the modules that an import in a package brings."""
         if isinstance(line, ast.Import):
-            yield from (each.name for each in line.names)
+            for each in line.names:
+                path, names = self._file(each.name), used.get(each.asname or each.name)
+                face = path is not None and path.name == "__init__.py"
+                handed = self._face(each.name, path) if path and face else {}
+                if names and names <= handed.keys():
+                    yield from (self._source(each.name, name) for name in sorted(names))
+                else:
+                    yield each.name
             return
         base = _absolute(line, package)
         yield from (self._source(base, each.name) for each in line.names)
@@ -126,14 +139,43 @@ class _Reached:
         return self._homes[module]
 
 
+@dataclass(frozen=True)
+class _File:
+    """What counts of a file."""
+
+    digest: str
+    imports: tuple[ast.Import | ast.ImportFrom, ...]
+    #: Attributes by the name that they are used of; nothing of a name that is used otherwise too.
+    used: Mapping[str, frozenset[str]]
+
+
 @lru_cache(maxsize=1024)  # entries share most of their files
-def _contents(path: Path, changed: int) -> tuple[str, tuple[ast.Import | ast.ImportFrom, ...]]:
-    """Return the digest of a file, as it is since a time [ns], and its imports."""
+def _contents(path: Path, changed: int) -> _File:
+    """Return what counts of a file, as it is since a time [ns]."""
     del changed
     words: list[str] = []
     imports: list[ast.Import | ast.ImportFrom] = []
-    _read(ast.parse(path.read_bytes()), words, imports)
-    return hashlib.sha256("\0".join(words).encode()).hexdigest(), tuple(imports)
+    tree = ast.parse(path.read_bytes())
+    _read(tree, words, imports)
+    digest = hashlib.sha256("\0".join(words).encode()).hexdigest()
+    whole = any(
+        each.name.partition(".")[0] in _PACKAGES
+        for line in imports
+        if isinstance(line, ast.Import)
+        for each in line.names
+    )
+    return _File(digest, tuple(imports), _used(tree) if whole else {})
+
+
+def _used(tree: ast.AST) -> dict[str, frozenset[str]]:
+    """Return the attributes that a file uses of each name that it uses for nothing else."""
+    found: dict[str, set[str]] = {}
+    names = Counter(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            found.setdefault(node.value.id, set()).add(node.attr)
+            names[node.value.id] -= 1
+    return {name: frozenset(those) for name, those in found.items() if not names[name]}
 
 
 def _absolute(line: ast.ImportFrom, package: str) -> str:

@@ -105,6 +105,16 @@ def test_what_can_change_a_number_counts(tree, name, old, new):
     assert tree(name, new, old) == before
 
 
+@pytest.mark.parametrize(("use", "counts"), [("room.number()", False), ("work(room)", True)])
+def test_of_a_face_that_is_imported_whole_what_is_used_counts(tree, monkeypatch, use, counts):
+    monkeypatch.setattr(digest, "_PACKAGES", ("small_house",))
+    tree("entry.py", "from .room import number", "import small_house.room as room")
+    before = tree("entry.py", "return number()", f"return {use}")
+    assert tree("room/numbers.py", "1.0", "1.5") != before
+    tree("room/numbers.py", "1.5", "1.0")
+    assert (tree("room/others.py", "5.0", "6.0") != before) == counts
+
+
 def test_the_versions_of_the_libraries_count(tree, monkeypatch):
     before = tree()
     real = digest.version
