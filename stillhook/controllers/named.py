@@ -112,7 +112,9 @@ def feedback_of(
     from synth.loop import LinearController
 
     anti_windup = not name.endswith("-no-antiwindup")
-    options: dict[str, Any] = {"sample_time": sample_time, "anti_windup": anti_windup, "name": name}
+    options: dict[str, Any] = {"anti_windup": anti_windup, "name": name}
+    if sample_time is not None:
+        options["sample_time"] = sample_time
     if isinstance(law, Mapping | LinearController):
         made = LinearFeedback(case, law, **options)
     else:

@@ -29,7 +29,7 @@ def test_sample_time_is_the_controllers_own_unless_asked_for() -> None:
     case = load_case("thesis-1975")
     for kind in set(LINEAR) - {"feedback-no-antiwindup"}:
         own = controller_by_name(kind, case).sample_time
-        assert own == (0.01 if kind == "feedback" else 0.02)
+        assert own == (0.005 if kind == "feedback" else 0.02)
         assert controller_by_name(kind, case, sample_time=0.05).sample_time == 0.05
 
 

@@ -98,7 +98,7 @@ def test_a_lost_link_is_told_of_a_law_in_the_loop() -> None:
     runs = sh.simulate(
         case, "feedback", scenario="sensor-loss", options={"wait": 40.0}, duration=60.0, seeds=1
     )
-    assert runs[0].timings.statuses["blind"] * 0.01 == pytest.approx(9.0, abs=0.1)
+    assert runs[0].timings.statuses["blind"] * runs[0].sample_time == pytest.approx(9.0, abs=0.1)
     assert any("heard nothing" in event.text for event in runs[0].events)
 
 

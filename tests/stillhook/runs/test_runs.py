@@ -273,8 +273,8 @@ def test_a_controller_without_answer_is_told_and_the_load_is_held():
     controller = Broken(sh.LinearFeedback(calm(), THESIS), since=30.0, answer=lambda: math.nan)
     runs = sh.simulate(calm(), controller, duration="1 min")
     assert runs.completed
-    assert runs[0].timings.fallbacks == {"not a number": 3001}
-    assert "3001 commands of the controller could not be used" in str(runs)
+    assert runs[0].timings.fallbacks == {"not a number": 6001}
+    assert "6001 commands of the controller could not be used" in str(runs)
     assert "at 30 s: the controller returned no number" in str(runs)
 
 

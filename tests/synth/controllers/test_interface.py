@@ -29,7 +29,9 @@ from synth.structures import DrumSpeedLoop
 from synth.structures.recursive import at_rest
 
 MAKERS = {
-    "feedback": lambda case: LinearFeedback(case, {"a": 1.0, "a1": 5.0, "a2": 3.0}),
+    "feedback": lambda case: LinearFeedback(
+        case, {"a": 1.0, "a1": 5.0, "a2": 3.0}, sample_time=0.01
+    ),
     "feed-forward": VelocityFeedForward,
     "constant-tension": ConstantTension,
 }
@@ -178,7 +180,9 @@ def test_recursion_kernel_and_steps_from_python_agree(name: str, kind: str) -> N
 
 def test_a_set_point_that_is_no_number_keeps_its_place() -> None:
     case, T = load_case("thesis-1975"), 0.01
-    controller = operated(LinearFeedback(case, {"a": 0.0, "a1": 0.0, "a2": 1.0}), case)
+    controller = operated(
+        LinearFeedback(case, {"a": 0.0, "a1": 0.0, "a2": 1.0}, sample_time=T), case
+    )
     rows = np.tile(still("thesis-1975"), (1500, 1))
     rows[:, AT["reference.displacement"]] = rows[:, AT["payload.displacement"]] = 0.4
     lost = rows.copy()
@@ -235,7 +239,7 @@ def test_the_set_point_moves_at_the_operators_rate() -> None:
 
 def test_the_command_stays_within_value_and_rate() -> None:
     case = load_case("thesis-1975")
-    loud = LinearFeedback(case, {"a": 0.0, "a1": 0.0, "a2": 1e6})
+    loud = LinearFeedback(case, {"a": 0.0, "a1": 0.0, "a2": 1e6}, sample_time=0.01)
     controller = operated(loud, case, ramp=0.0, slew=1000.0)
     rows = seen("thesis-1975", 500, seed=7, size=1.0)
     found = commands(controller, rows)
