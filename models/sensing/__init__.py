@@ -52,6 +52,8 @@ if TYPE_CHECKING:
         SWITCHING_TURN,
         SwitchingNoise,
         SwitchingShape,
+        density_of,
+        velocity_correlation,
     )
     from .telemetry import LATE, Interval, Late, TelemetrySchedule, check_intervals
 else:

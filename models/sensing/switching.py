@@ -102,9 +102,8 @@ class SwitchingShape(Generic[_Motion]):
         if speed not in self._levels:
             kappa = speed**2 / (speed**2 + 2.0 / math.pi * SWITCHING_TURN**2)
             rho = kappa * self._correlation
-            found = np.fft.rfft(2.0 / math.pi * (np.arcsin(rho) - rho)).real * _STEP / math.pi
+            omega, found = density_of(2.0 / math.pi * (np.arcsin(rho) - rho))
             least = max(_FAINT * float(found.max()), np.finfo(float).tiny)
-            omega = _omega()
             held = slice(int(np.searchsorted(omega, SWITCHING_BAND[1])) + 1)
             level = np.log(np.maximum(found, least)[held])
             self._levels[speed] = CubicSpline(
@@ -116,13 +115,22 @@ class SwitchingShape(Generic[_Motion]):
 
     @cached_property
     def _correlation(self) -> FloatArray:
-        """The autocorrelation of the hook's velocity."""
-        omega = _omega()
-        seen = (omega > 0.0) & (omega < _TOP)
-        velocity = np.zeros(omega.size)
-        velocity[seen] = omega[seen] ** 2 * self.hook.density(omega[seen])
-        covariance = np.fft.irfft(velocity, _COUNT)
-        return np.asarray(covariance / covariance[0])
+        return velocity_correlation(self.hook)
+
+
+def velocity_correlation(motion: _Moving) -> FloatArray:
+    """Return the autocorrelation of a motion's velocity, 1 at first, as `density_of` takes it."""
+    omega = _omega()
+    seen = (omega > 0.0) & (omega < _TOP)
+    velocity = np.zeros(omega.size)
+    velocity[seen] = omega[seen] ** 2 * motion.density(omega[seen])
+    covariance = np.fft.irfft(velocity, _COUNT)
+    return np.asarray(covariance / covariance[0])
+
+
+def density_of(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies [rad/s], and there the one-sided density of an autocovariance."""
+    return _omega(), np.fft.rfft(covariance).real * _STEP / math.pi
 
 
 def _omega() -> FloatArray:

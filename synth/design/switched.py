@@ -29,6 +29,15 @@ r k a^3/3), k = (8/(3 pi))/sqrt(8/pi), r the drag's share of the damping (stocha
 Roberts and Spanos 1990, ch. 8).  r of a signal is how its variance falls as the drag's coefficient
 rises, -dlog(sigma^2)/dlog(C), and A is as much smaller as its largest swing is.
 
+What is no friction of the drag is a force beside it, as of the losses: of a Gaussian velocity of
+autocorrelation rho, q |v| v has the autocovariance
+
+    q^2 sigma^4 (2/pi) ((1 + 2 rho^2) asin(rho) + 3 rho sqrt(1 - rho^2)),
+
+of which 8/pi rho is the friction's (L. E. Borgman 1967, *Spectral analysis of ocean wave forces on
+piling*).  It has a sixth of the variance, about the waves and about three times their frequency,
+where a resonance may lie that has little damping.
+
 *Readings.*  A payload signal that is read every h seconds and held is a staircase: the signal,
 later by h/2, and its images about every multiple of 2 pi/h (K. J. Astrom and B. Wittenmark,
 *Computer-Controlled Systems*, 1997, section 7.2).  A density S(omega) before the readings comes
@@ -50,7 +59,16 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from models.basics import ComplexArray, FloatArray, Quadrature, peak_factor
-from models.sensing import SET_POINT, SWITCHING_TURN, SwitchingNoise, SwitchingShape
+from models.sensing import (
+    SET_POINT,
+    SWITCHING_TURN,
+    SwitchingNoise,
+    SwitchingShape,
+    density_of,
+    velocity_correlation,
+)
+
+from ..loop import DragElement
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -218,6 +236,13 @@ def swing(share: float, gaussian: float) -> float:
     return float(brentq(lambda x: fallen(x) - lasting, 0.0, 3.0 * gaussian)) / gaussian
 
 
+def remnant_of_drag(rho: FloatArray) -> FloatArray:
+    """Return the autocovariance of |v| v - sqrt(8/pi) sigma v over sigma^4, by that of v."""
+    rho = np.clip(rho, -1.0, 1.0)
+    whole = (1.0 + 2.0 * rho**2) * np.arcsin(rho) + 3.0 * rho * np.sqrt(1.0 - rho**2)
+    return np.asarray(2.0 / math.pi * whole - 8.0 / math.pi * rho)
+
+
 def image_frequencies(lines: FloatArray, hold: float) -> FloatArray:
     """Return where lines (l,) come again below and above multiples of 2 pi/hold, (2 i l,)."""
     about = 2.0 * math.pi / hold * np.arange(1, _IMAGES + 1)[:, np.newaxis]
@@ -348,7 +373,25 @@ class SwitchedLoop:
 
     @cached_property
     def _names(self) -> list[str]:
-        return [source.name for source in self.loop.disturbances]
+        own = [source.name for source in self.loop.disturbances]
+        return own if self._drag is None else [*own, self._drag.force]
+
+    @property
+    def _drag(self) -> DragElement | None:
+        """The payload's drag; None where it has none that is quadratic."""
+        drags = (one for one in self.loop.elements if isinstance(one, DragElement))
+        return next((one for one in drags if one.quadratic > 0.0), None)
+
+    @cached_property
+    def _drag_remnant(self) -> tuple[FloatArray, FloatArray]:
+        """Frequencies, and the density of the drag that is no friction [N2 s/rad]."""
+        drag = self._drag
+        assert drag is not None
+        nodes = self.loop.quadrature([drag.velocity])
+        density = self.loop.spectrum(drag.velocity, nodes.omega)
+        moving = _Turning(omega=nodes.omega, velocity=density)
+        size = drag.quadratic * nodes.integrate(density)
+        return density_of(size**2 * remnant_of_drag(velocity_correlation(moving)))
 
     def _share(self, signal: str) -> float:
         loss = self.question.plant.loss
@@ -415,6 +458,8 @@ class SwitchedLoop:
             yield f"{name}_noise", omega, np.full(omega.size, shares[-1] / _LINES)
 
     def _density(self, index: int, omega: FloatArray) -> FloatArray:
+        if index == len(self.loop.disturbances):
+            return np.interp(omega, *self._drag_remnant, right=0.0)
         if self._names[index] == SET_POINT and self._remnant is not None:
             noise, shape, speed = self._remnant
             return noise.as_command(omega, shape.at(omega, speed))

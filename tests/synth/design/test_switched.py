@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import lfilter, welch
 
+import stillhook as sh
+from models import load_case
 from models.basics import Quadrature
-from synth.design.switched import SwitchedSignal, crest, image_frequencies, swing
+from models.sensing import density_of, velocity_correlation
+from synth.design.switched import (
+    SwitchedSignal,
+    crest,
+    image_frequencies,
+    remnant_of_drag,
+    swing,
+)
+from synth.loop import DragElement
 
 _PEAK, _WIDE = 0.8, 0.25  # of the disturbance's density [rad/s]
 _LAG = 0.5  # of the loop's answer to a loss [s]
@@ -150,3 +161,59 @@ def test_drag_keeps_the_largest_swings_of_a_resonance_down(share):
     dragged, gaussian = largest.mean(axis=1)
     assert dragged / gaussian == pytest.approx(swing(share, gaussian), rel=0.015)
     assert swing(share, gaussian) < 0.96
+
+
+@pytest.mark.parametrize("rho", [1.0, 0.9, 0.3, -0.6])
+def test_what_is_no_friction_of_drag_has_the_covariance_of_gaussian_pairs(rho):
+    # |v| v has a kink in its slope: a fine rule by hand, as Gauss and Hermite's converges slowly.
+    x = np.linspace(-8.0, 8.0, 1601)
+    weights = np.exp(-0.5 * x**2) / math.sqrt(2.0 * math.pi) * (x[1] - x[0])
+
+    def left(v):
+        return np.abs(v) * v - math.sqrt(8.0 / math.pi) * v
+
+    other = left(rho * x[:, np.newaxis] + math.sqrt(1.0 - rho**2) * x) @ weights
+    found = remnant_of_drag(np.array([rho]))[0]
+    assert found == pytest.approx((left(x) * other) @ weights, abs=1e-5)
+
+
+def test_drag_that_is_no_friction_shakes_at_three_times_the_waves():
+    """Of a drawn record of a narrow sea, by its periodograms."""
+    rng, step, size = np.random.default_rng(3), 0.1, 2**13
+    omega = 2.0 * math.pi * np.fft.rfftfreq(256 * size, step)
+    density = np.exp(-0.5 * ((omega - 0.8) / 0.15) ** 2)
+    density /= density.sum() * omega[1]
+    drawn = rng.standard_normal((2, omega.size)).T @ [1.0, 1j]
+    v = np.fft.irfft(drawn * np.sqrt(0.25 * density * omega[1]) * 256 * size)
+    left = np.abs(v) * v - math.sqrt(8.0 / math.pi) * v
+    frequency, power = welch(left, fs=1.0 / step, nperseg=size)
+    at, found = density_of(remnant_of_drag(velocity_correlation(Moving(omega, density))))
+    for low, high in ((0.5, 1.2), (1.8, 3.0), (3.2, 4.8)):
+        seen = (2.0 * math.pi * frequency > low) & (2.0 * math.pi * frequency < high)
+        told = (at > low) & (at < high)
+        share = power[seen].sum() * frequency[1]
+        assert found[told].sum() * at[1] == pytest.approx(share, rel=0.06)
+
+
+class Moving:
+    def __init__(self, omega, velocity):
+        self._omega, self._velocity = omega, velocity
+
+    def density(self, omega):
+        return np.interp(omega, self._omega, self._velocity) / omega**2
+
+
+def test_a_design_hears_its_own_drag(monkeypatch):
+    case = load_case("subsea-crane").replace(
+        {"sea.significant_height": 3.0, "payload.drag_coefficient": 3.0}
+    )
+    design = sh.evaluate_gains(case, {"a": 0.0, "a1": 0.1, "a2": 0.1}, "payload-feedback")
+    element = next(one for one in design.assessment.elements if isinstance(one, DragElement))
+    sigma = design.assessment.sigma(element.velocity)
+    at, density = design.switched._drag_remnant
+    whole = (3.0 - 8.0 / math.pi) * (element.quadratic * sigma**2) ** 2
+    assert density.sum() * at[1] == pytest.approx(whole, rel=0.01)
+    moved = design.switched.deviation("payload.displacement")
+    monkeypatch.setattr("synth.design.switched.remnant_of_drag", np.zeros_like)
+    still = replace(design).switched.deviation("payload.displacement")
+    assert 1.002 < moved / still < 1.1
