@@ -113,10 +113,15 @@ def place_for(arguments: argparse.Namespace, name: str, ending: str = "") -> Pat
 
     Raises InputError if it is a folder that holds other people's files, unless `arguments.force`.
     """
-    place = Path(arguments.out or Path("out") / f"{folder_name(name)}{ending}")
+    place = Path(arguments.out or usual_place(name, ending))
     if not arguments.force:
         check_own(place)
     return place
+
+
+def usual_place(name: str, ending: str = "") -> Path:
+    """Return where results go unless a place is given."""
+    return Path("out") / f"{folder_name(name)}{ending}"
 
 
 def prepared(arguments: argparse.Namespace, place: str | Path, ending: str = "") -> OutputFolder:

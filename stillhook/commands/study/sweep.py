@@ -53,7 +53,7 @@ ARGUMENTS = (
     options(
         """
         who is tried:
-        --design FILE  a design that was written (design.yaml)
+        --design FILE  a design that was written, as in out/CASE/design.yaml
         | --gains A=..,a=..,a1=..,a2=..  gains, or parameters by name (default: the gains that the
             case has in use; else the best design is found, half a minute once)
         | --controller NAME  another controller, with --mode time, as in mpc (see `stillhook
