@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         read_text,
         reason,
         replace_atomically,
+        stl_facets,
         write_text_atomically,
     )
     from .hdf5_check import check_hdf5
