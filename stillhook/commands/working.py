@@ -169,8 +169,9 @@ def conclude(
     report
         What came of the command.
     arguments
-        If they ask to be quiet the verdict alone is printed; if they ask for JSON the report as
-        `stillhook.text.json_data` has it, with ``written``, the files, and nothing else.
+        If they ask to be quiet the verdict alone is printed, a list as it is; if they ask for JSON
+        the report as `stillhook.text.json_data` has it, with ``written``, the files, and nothing
+        else.
     folder
         Where files were written, if any were.
     following
@@ -187,6 +188,8 @@ def conclude(
         write_json(json_text(data | ({} if result is None else {"result": result})))
     elif arguments.quiet and brief:
         show(replace(report, sections=brief), out)
+    elif arguments.quiet and not report.status:
+        show(report, out)
     elif arguments.quiet:
         out.print(f"{report.name}: {report.status}", soft_wrap=True)
     else:
