@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         read_text,
         reason,
         replace_atomically,
+        stl_facets,
         write_text_atomically,
     )
     from .hdf5_check import check_hdf5
@@ -71,7 +72,7 @@ if TYPE_CHECKING:
         solve_riccati,
         truncation_of_roots,
     )
-    from .signals import White, pick, signal_delays, signal_names, signal_rates
+    from .signals import LONGEST_DELAY, White, pick, signal_delays, signal_names, signal_rates
     from .threads import one_thread
     from .units import KINDS, parse_quantity, read_quantity, units_of
     from .water import GRAVITY, SEA_WATER_DENSITY, wave_frequency, wave_number

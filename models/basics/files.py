@@ -117,11 +117,22 @@ def binary_name(data: bytes) -> str:
     >>> binary_name(b"%PDF-1.7 ..."), binary_name(b"sea: {}")
     ('a PDF document', '')
     """
+    if stl_facets(data):
+        return "a binary STL file: meshes of hulls go to `stillhook vessel hull --mesh`"
     if data.startswith(_ZIP):
         return next(
             (name for mark, name in _ZIPPED if mark in data), "an archive (.zip): unpack it"
         )
     return next((name for mark, name in _BINARIES if data.startswith(mark)), "")
+
+
+def stl_facets(data: bytes) -> int:
+    """Return how many facets a binary STL file has, 0 for what is none.
+
+    Its header is anything, so that only the count tells it, which must fit the length.
+    """
+    count = int.from_bytes(data[80:84], "little")
+    return count if len(data) == 84 + 50 * count else 0
 
 
 def read_text(path: str | Path, largest: int = _LARGEST) -> str:

@@ -10,6 +10,9 @@ import numpy.typing as npt
 from .arrays import FloatArray
 from .checks import InputError, check_range
 
+LONGEST_DELAY = 60.0
+"""Longest delay that sensors and telemetry have [s]; a delay margin beyond it means nothing."""
+
 
 @dataclass(frozen=True)
 class White:

@@ -32,6 +32,7 @@ import numpy.typing as npt
 from ..basics import FloatArray, InputError, check_range
 from ..case import Case
 from ..hook import HookMotion
+from ..sea import SHORTEST
 from .hermite import MotionBlock, interpolated
 
 HOOK = None  #: Purpose of a random motion that is drawn with the run's own seed.
@@ -184,13 +185,13 @@ class Motion:
 class SineMotion:
     """A sine, z = amplitude sin(2 pi t/period + phase)."""
 
-    amplitude: float  #: Amplitude [m].
-    period: float  #: Period [s].
+    amplitude: float  #: Amplitude [m], of 0 to 100 m.
+    period: float  #: Period [s], of 0.5 s, as those of seas, to 1000 s.
     phase: float = 0.0  #: Phase at the start [rad].
 
     def __post_init__(self) -> None:
-        check_range("sine motion", "amplitude", self.amplitude, low=0.0, unit="m")
-        check_range("sine motion", "period", self.period, low=0.0, unit="s", open_low=True)
+        check_range("sine motion", "amplitude", self.amplitude, low=0.0, high=100.0, unit="m")
+        check_range("sine motion", "period", self.period, low=SHORTEST, high=1e3, unit="s")
         check_range("sine motion", "phase", self.phase, unit="rad")
 
     @property

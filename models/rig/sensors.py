@@ -14,11 +14,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import model_validator
 
+from ..basics import LONGEST_DELAY
 from ..casefile import Quantity, Section
 
 _BANDWIDTH_LOW, _BANDWIDTH_HIGH = 0.1, 1e5
+_SEEN = 1e4  # of what sees the payload [rad/s]: all that moves is slower by a hundred times
 _Rate = Annotated[float, Quantity("frequency", _BANDWIDTH_LOW, _BANDWIDTH_HIGH)]
-_Latency = Annotated[float, Quantity("time", 0.0, 60.0)]
+_Latency = Annotated[float, Quantity("time", 0.0, LONGEST_DELAY)]
 
 
 class PayloadSensor(Section):
@@ -26,7 +28,7 @@ class PayloadSensor(Section):
 
     bandwidth: Annotated[
         float | Literal["perfect"],
-        Quantity("frequency", _BANDWIDTH_LOW, _BANDWIDTH_HIGH, word="perfect"),
+        Quantity("frequency", _BANDWIDTH_LOW, _SEEN, word="perfect"),
     ] = "perfect"
     """Bandwidth of the second-order Butterworth low-pass on all three signals; `perfect` for
     none."""
@@ -85,14 +87,12 @@ class PayloadSensor(Section):
 class Telemetry(Section):
     """The link from the payload to the winch."""
 
-    delay: Annotated[float, Quantity("time", 0.0, 60.0)] = 0.0
+    delay: Annotated[float, Quantity("time", 0.0, LONGEST_DELAY)] = 0.0
     """Delay from the payload's motion to the drive's command."""
-    bandwidth: Annotated[float, Quantity("frequency", _BANDWIDTH_LOW, _BANDWIDTH_HIGH)] | None = (
-        None
-    )
+    bandwidth: Annotated[float, Quantity("frequency", _BANDWIDTH_LOW, _SEEN)] | None = None
     """Bandwidth of the link (second-order Butterworth low-pass, after the sensor's); not given
     for none."""
-    jitter: Annotated[float, Quantity("time", 0.0, 60.0)] = 0.0
+    jitter: Annotated[float, Quantity("time", 0.0, LONGEST_DELAY)] = 0.0
     """Largest extra delay of a message: each is late by anything between 0 and this, all equally
     likely."""
     dropout: Annotated[float, Quantity("ratio", 0.0, 1.0, open_high=True)] = 0.0

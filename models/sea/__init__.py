@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from .records import SeaRecords, read_seas
     from .scatter import Scatter
     from .scatter_files import read_scatter, write_scatter
-    from .sea import SeaSpectrum
+    from .sea import SHORTEST, SeaSpectrum
     from .sea_section import Sea
     from .series import LONGEST_GAP, SeaSeries, relative_heading
     from .series_files import holds_series, read_series
-    from .shapes import breaking_steepness
+    from .shapes import breaking_height
     from .spreading import Spreading
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -63,6 +63,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
 """What each kind needs, besides the height that all standard forms do."""
 
 SHORTEST = 0.5  #: Shortest period of a sea [s]: of ripples 0.4 m long.
+SHALLOWEST = 1.0  #: Least depth of a sea [m]: in less nobody lifts anything.
+_LEAST = {"s": SHORTEST, "m": SHALLOWEST}
 _UNITS = {"peak_period": "s", "significant_period": "s", "depth": "m", "width": "rad/s"}
 
 HIGHEST_FREQUENCY = 60.0
@@ -248,8 +250,8 @@ class SeaSpectrum:
             if wanted and value is None:
                 needed = f"{name} [{unit}]" if unit else name
                 raise InputError(f"sea: spectrum {self.kind} needs {needed}")
-            if wanted and unit == "s":
-                check_range("sea", name, value, low=SHORTEST, unit=unit)
+            if wanted and unit in _LEAST:
+                check_range("sea", name, value, low=_LEAST[unit], unit=unit)
             elif wanted and unit:
                 check_range("sea", name, value, low=0.0, unit=unit, open_low=True)
 

@@ -25,7 +25,7 @@ from pydantic import (
 
 from ..basics import GRAVITY, InputError, file_stamp, range_text
 from ..casefile import DataFile, Quantity, Section, problems
-from .sea import FIELDS, SHORTEST, SeaSpectrum, takes
+from .sea import FIELDS, SHALLOWEST, SHORTEST, SeaSpectrum, takes
 from .shapes import breaking_steepness, fully_arisen, gaussian_widths, jonswap_gamma
 from .spreading import Spreading
 from .table import SpectrumTable, row_faults
@@ -247,7 +247,7 @@ class TmaSea(_SeaOfLimitedFetch):
 
     spectrum: Literal["tma"]
     """`tma`: the JONSWAP sea in shallow water."""
-    depth: Annotated[float, Quantity("length", 0.0, 12e3, open_low=True)]
+    depth: Annotated[float, Quantity("length", SHALLOWEST, 12e3)]
     """Water depth, for `tma` only."""
 
 

@@ -58,6 +58,11 @@ def breaking_steepness(peak_period: float | FloatArray) -> FloatArray:
     return np.asarray(np.interp(peak_period, (8.0, 15.0), (1.0 / 15.0, 1.0 / 25.0)))
 
 
+def breaking_height(periods: FloatArray) -> FloatArray:
+    """Return the H_s above which seas of a peak period are not observed [m]."""
+    return np.asarray(breaking_steepness(periods) * GRAVITY * periods**2 / (2.0 * math.pi))
+
+
 def fully_developed_period(significant_height: float) -> float:
     r"""Return the peak period of a fully developed sea of H_s [m], by Pierson and Moskowitz [s].
 

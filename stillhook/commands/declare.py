@@ -163,20 +163,15 @@ CASE = options(f"case  {_CASE}{_SET}")
 #: None where something else names it.
 OPTIONAL_CASE = options(f"[case]  {_CASE}{_SET}")
 
-_DESIGN = """
---design FILE  a design that was written (design.yaml)
---gains A=..,a=..,a1=..,a2=..  or gains, or parameters by name (default: the gains that the
-    case has in use{})
---structure NAME  whose parameters these are (default: payload-feedback){}
-"""
-#: The design, a file or gains; `commands.given_design` reads it.
-NAMED_DESIGN = options(_DESIGN.format("", ""))
-#: The same, or the best design of the case.
+#: The design: a file, gains, or the best one of the case; `commands.given_design` reads it.
 DESIGN = options(
-    _DESIGN.format(
-        "; else the best design is found, half a minute once",
-        "; without --gains its best ones are found",
-    )
+    """
+    --design FILE  a design that was written, as in out/CASE/design.yaml
+    --gains A=..,a=..,a1=..,a2=..  or gains, or parameters by name (default: the gains that the
+        case has in use; else the best design is found, half a minute once)
+    --structure NAME  whose parameters these are (default: payload-feedback); without --gains its
+        best ones are found
+    """
 )
 NO_BOUND = options(
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import shlex
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -12,6 +13,8 @@ from models.basics import InputError, SynthesisError
 from ..text import Report, ReportSection
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from models import Case
     from synth.design import Design
 
@@ -33,14 +36,14 @@ def names_design(case: Case, arguments: argparse.Namespace) -> bool:
     return arguments.structure is None and case.gains is not None
 
 
-def given_design(case: Case, arguments: argparse.Namespace, *, search: bool = True) -> Design:
+def given_design(case: Case, arguments: argparse.Namespace) -> Design:
     """Return the parameters of a file, those given, the gains in use or the best, on the case.
 
     The best ones, of the structure that is named if one is, are searched for where there are no
-    others, if `search`.
+    others.
 
-    Raises InputError if a file and gains are given, the file holds no design, or there is none and
-    no search; SynthesisError if no design was found.
+    Raises InputError if a file and gains are given, or the file holds no design; SynthesisError if
+    no design was found.
     """
     # Here, as the parser imports this file and has to be quick.
     from synth import evaluate_gains
@@ -62,11 +65,6 @@ def given_design(case: Case, arguments: argparse.Namespace, *, search: bool = Tr
         structure = arguments.structure or "payload-feedback"
         gains = case.gains if arguments.gains is None else parse_gains(arguments.gains, structure)
         return evaluate_gains(case, gains, structure)
-    if not search:
-        raise InputError(
-            f"{case.source}: gains: the case has none in use; give them, as in --gains "
-            "A=1,a=0,a1=0,a2=0.5, or --design with a design.yaml that `stillhook optimise` wrote"
-        )
     from ..designs import best_design
     from .working import working
 
@@ -78,11 +76,41 @@ def given_design(case: Case, arguments: argparse.Namespace, *, search: bool = Tr
 
 
 def with_design(
-    report: Report, design: Design, case: Case, arguments: argparse.Namespace
+    report: Report, design: Design | None, case: Case, arguments: argparse.Namespace
 ) -> Report:
-    """Return a report on a design, that says which one it is where nobody has named it."""
-    if names_design(case, arguments):
+    """Return a report on a design, that says which one it is where no option has named it.
+
+    Without one it is on the gains that the case has in use.
+    """
+    if arguments.design is not None or arguments.gains is not None:
         return report
-    mark = "" if design.ok else f", NOT OK ({design.status})"
-    text = f"design: {design.structure}, found for this case{mark}; give --design to use another"
+    other = lying_design(case, design)
+    words = "--design" if other is None else f"--design {shlex.quote(str(other))}"
+    text = f"design: the gains that the case has in use; give {words} to use another"
+    if not names_design(case, arguments):
+        assert design is not None
+        mark = "" if design.ok else f", NOT OK ({design.status})"
+        text = f"design: {design.structure}, found for this case{mark}; give {words} to use another"
+    elif other is None:
+        return report
     return replace(report, sections=[ReportSection("", [text]), *report.sections])
+
+
+def lying_design(case: Case, used: Design | None = None) -> Path | None:
+    """Return the file of a design for a case where `optimise` leaves one, other than that in use.
+
+    It is told, and not taken unasked: what a command does hangs on its words alone.
+    """
+    from ..designs import load_design
+    from .working import usual_place
+
+    path = usual_place(case.name) / "design.yaml"
+    with contextlib.suppress(InputError):  # none there, or not whole
+        found = load_design(path)
+        mine = used is not None and (found.structure, found.parameters) == (
+            used.structure,
+            used.parameters,
+        )
+        if found.case == case and found.parameters and not mine:
+            return path
+    return None

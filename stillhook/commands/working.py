@@ -113,10 +113,15 @@ def place_for(arguments: argparse.Namespace, name: str, ending: str = "") -> Pat
 
     Raises InputError if it is a folder that holds other people's files, unless `arguments.force`.
     """
-    place = Path(arguments.out or Path("out") / f"{folder_name(name)}{ending}")
+    place = Path(arguments.out or usual_place(name, ending))
     if not arguments.force:
         check_own(place)
     return place
+
+
+def usual_place(name: str, ending: str = "") -> Path:
+    """Return where results go unless a place is given."""
+    return Path("out") / f"{folder_name(name)}{ending}"
 
 
 def prepared(arguments: argparse.Namespace, place: str | Path, ending: str = "") -> OutputFolder:
@@ -164,8 +169,9 @@ def conclude(
     report
         What came of the command.
     arguments
-        If they ask to be quiet the verdict alone is printed; if they ask for JSON the report as
-        `stillhook.text.json_data` has it, with ``written``, the files, and nothing else.
+        If they ask to be quiet the verdict alone is printed, a list as it is; if they ask for JSON
+        the report as `stillhook.text.json_data` has it, with ``written``, the files, and nothing
+        else.
     folder
         Where files were written, if any were.
     following
@@ -182,6 +188,8 @@ def conclude(
         write_json(json_text(data | ({} if result is None else {"result": result})))
     elif arguments.quiet and brief:
         show(replace(report, sections=brief), out)
+    elif arguments.quiet and not report.status:
+        show(report, out)
     elif arguments.quiet:
         out.print(f"{report.name}: {report.status}", soft_wrap=True)
     else:

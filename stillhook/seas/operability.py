@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from models.sea import breaking_height
 from synth.operability import AtDepth, Contour, ContourCheck, Operability, rule_shares
 
 from ..text import (
@@ -40,8 +40,13 @@ FIGURES = ("contour", "capability", "headings", "depths", "scatter")
 """Names of the figures, of which a study has some."""
 
 
-def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) -> Report:
-    """Return a study: a table for each length of rope, the shares of the year, the figures."""
+def operability_report(
+    study: Operability, checks: Sequence[ContourCheck] = (), *, rules: bool = False
+) -> Report:
+    """Return a study: a table for each length of rope, the shares of the year, the figures.
+
+    With `rules` the shares of the year by the rules of thumb of 1975 stand beside its own.
+    """
     sections = []
     for at in study.depths:
         margin = [study.margin_text(at)] if study.design is not None else []
@@ -52,6 +57,10 @@ def operability_report(study: Operability, checks: Sequence[ContourCheck] = ()) 
     if study.scatter is not None:
         source = study.scatter.source
         sections.append(ReportSection(f"workable share of the year, {source}", _shares(study)))
+        if rules:
+            heads = "operation=rules of thumb, 1975 thesis, Table 2; safe [%]; or marginal [%]"
+            table = Table(columns=columns(heads), rows=rule_shares(study.scatter))
+            sections.append(ReportSection("", [table]))
     rows = []
     if checks:
         worst = max(check.difference for check in checks)
@@ -126,9 +135,15 @@ def _contours(at: AtDepth) -> Table:
 def _cells(contour: Contour, p: int) -> tuple[str, str]:
     worst = int(contour.limit[:, p].argmin())
     ends = [float(contour.limit[worst, p]), float(contour.limit[:, p].max())]
-    texts = [f">{contour.highest:g}" if math.isinf(h) else f"{h:.2f}" for h in ends]
+    # Of seas that break nobody wants to know what they would do to a winch.
+    breaking = float(breaking_height(contour.periods)[p])
+    most = min(breaking, contour.highest)
+    top = f">{most:.2f}" if breaking < contour.highest else f">{most:g}"
+    texts = [top if h >= most else f"{h:.2f}" for h in ends]
     several = contour.limit.shape[0] > 1
-    return "..".join(texts if several else texts[:1]), _plain(str(contour.binding[worst, p]))
+    by = _plain(str(contour.binding[worst, p]))
+    by = "steepest seas" if ends[0] >= breaking else by
+    return "..".join(texts if several else texts[:1]), by
 
 
 def _plain(name: str) -> str:
@@ -167,6 +182,4 @@ def _shares(study: Operability) -> list[Item]:
         each = [Column(MONTHS[m - 1], write=lambda v: f"{100.0 * v:.0f}") for m in known]
         note = f"% of each month with {first.length:g} m of rope"
         items.append(Table(columns=(Column("system", ""), *each), rows=shares, notes=(note,)))
-    heads = columns("operation=rules of thumb, 1975 thesis, Table 2; safe [%]; or marginal [%]")
-    assert study.scatter is not None
-    return [*items, Table(columns=heads, rows=rule_shares(study.scatter))]
+    return items

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import GRAVITY, FloatArray
-from models.sea import breaking_steepness
+from models.basics import FloatArray
+from models.sea import breaking_height
 from synth.limits import Limit
 from synth.operability import AtDepth, Operability
 
@@ -91,11 +91,6 @@ def pale(name: str) -> tuple[float, float, float]:
     return tuple(c + (1.0 - c) * mixed for c in (red, green, blue))  # type: ignore[return-value]
 
 
-def steepest(periods: FloatArray) -> FloatArray:
-    """Return the H_s above which seas of a peak period are not observed [m]."""
-    return np.asarray(breaking_steepness(periods) * GRAVITY * periods**2 / (2.0 * math.pi))
-
-
 def top_of(
     periods: FloatArray, envelopes: list[FloatArray], others: FloatArray | None = None
 ) -> float:
@@ -103,10 +98,10 @@ def top_of(
 
     The next limit above is shown too, if it is not far away.
     """
-    reached = max(float(np.minimum(e, steepest(periods)).max()) for e in envelopes)
+    reached = max(float(np.minimum(e, breaking_height(periods)).max()) for e in envelopes)
     room = 1.5 * reached
     if others is not None:
-        near = np.where(others < steepest(periods), others, np.inf).min(axis=1)
+        near = np.where(others < breaking_height(periods), others, np.inf).min(axis=1)
         above = np.sort(near[near > room])
         if above.size and above[0] < _FAR * reached:
             room = 1.15 * float(above[0])
@@ -119,7 +114,9 @@ def shade(axes: Axes, periods: FloatArray, limit: FloatArray) -> None:
         T = np.linspace(periods[0], periods[-1], 400)
         # Lines that leave for infinity do so between two periods.
         below = np.interp(T, periods, np.minimum(limit, 1e3))
-        axes.fill_between(T, 0.0, np.minimum(below, steepest(T)), color=_SHADE, linewidth=0.0)
+        axes.fill_between(
+            T, 0.0, np.minimum(below, breaking_height(T)), color=_SHADE, linewidth=0.0
+        )
 
 
 def limit_line(
@@ -132,8 +129,10 @@ def limit_line(
 def _frame(axes: Axes, periods: FloatArray, top: float, label: str) -> None:
     """Draw the steepest seas of each period; make the axes those of peak period and H_s."""
     T = np.linspace(periods[0], periods[-1], 100)
-    if steepest(T).min() < top:
-        axes.plot(T, steepest(T), color=_STEEP, linestyle=":", linewidth=1.2, label="steepest seas")
+    if breaking_height(T).min() < top:
+        axes.plot(
+            T, breaking_height(T), color=_STEEP, linestyle=":", linewidth=1.2, label="steepest seas"
+        )
     axes.set_ylim(0.0, top)
     axes.set_ylabel(label)
     axes.set_xlabel(r"peak period $T_p$ [s]")
@@ -260,7 +259,7 @@ def _finding(study: Operability, at: AtDepth, h: int) -> str:
     contour = at.main
     limit = contour.limit[h]
     # Limits above the steepest seas bind nothing.
-    real = np.isfinite(limit) & (limit < steepest(contour.periods))
+    real = np.isfinite(limit) & (limit < breaking_height(contour.periods))
     finite = limit[real]
     if not np.isfinite(limit).any():
         return f"Nothing binds up to H_s {contour.highest:g} m"
@@ -289,13 +288,13 @@ def heading_figure(study: Operability) -> Figure:
     left = figure.add_subplot(1, 2, 1, projection="polar")
     right = figure.add_subplot(1, 2, 2, projection="polar")
     # Above the steepest seas of a period there is nothing to be limited.
-    limit = np.minimum(contour.limit, steepest(contour.periods))
+    limit = np.minimum(contour.limit, breaking_height(contour.periods))
     levels = MaxNLocator(10, steps=[1, 2, 5, 10]).tick_values(0.0, max(float(limit.max()), 0.1))
     bands = BoundaryNorm(levels, 256, extend="neither")
     mesh = left.pcolormesh(edges, rings, limit.T, cmap="viridis", norm=bands)
     bar = figure.colorbar(mesh, ax=left, shrink=0.8, pad=0.08, location="bottom")
     bar.set_label(r"limiting $H_s$ [m], up to the steepest seas")
-    real = contour.limit < steepest(contour.periods)
+    real = contour.limit < breaking_height(contour.periods)
     binding = np.where(real, contour.binding, "")
     names = [str(n) for n in np.unique(binding)]
     number = np.searchsorted(names, binding)

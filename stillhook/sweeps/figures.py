@@ -8,7 +8,7 @@ Cases that are not stable are shown as such and enter no distribution.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -311,8 +311,10 @@ def _histogram(axes: Axes, values: FloatArray, stable: npt.NDArray[np.bool_]) ->
 
 
 def _cloud(axes: Axes, x: FloatArray, y: FloatArray, stable: npt.NDArray[np.bool_]) -> None:
-    axes.scatter(x[stable], y[stable], s=4, color=AFTER, alpha=0.35, linewidths=0.0)
-    axes.scatter(x[~stable], y[~stable], s=7, color=BROKEN, alpha=0.8, linewidths=0.0)
+    # Ten thousand points: as pixels, in figures of lines too.
+    style: Any = {"linewidths": 0.0, "rasterized": True}
+    axes.scatter(x[stable], y[stable], s=4, color=AFTER, alpha=0.35, **style)
+    axes.scatter(x[~stable], y[~stable], s=7, color=BROKEN, alpha=0.8, **style)
 
 
 def _tidy(axes: Axes, i: int, j: int, count: int, labels: Sequence[str]) -> None:

@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from models.basics import LONGEST_DELAY
+
 if TYPE_CHECKING:
     from models.rig import Limits
 
@@ -29,7 +31,6 @@ _SCALES: dict[str, tuple[tuple[float, str], ...]] = {
     "rpm": ((2.0 * math.pi / 60.0, "rpm"),),  # from rad/s
 }
 _PLAIN = (1e-4, 1e7)  # sizes that are written without a power of ten
-_BEYOND_DELAYS = 60.0  # [s]
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -69,7 +70,7 @@ def delay_margin(seconds: float) -> str:
     >>> delay_margin(0.0152), delay_margin(1574.0)
     ('15.2 ms', '-')
     """
-    return quantity(seconds, "s") if seconds < _BEYOND_DELAYS else "-"
+    return quantity(seconds, "s") if seconds <= LONGEST_DELAY else "-"
 
 
 def quantity(value: float, unit: str, digits: int = 3, *, size: float | None = None) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from models.basics import BoolArray, ComplexArray, FloatArray
+from models.basics import LONGEST_DELAY, BoolArray, ComplexArray, FloatArray
 
 LoopGain = Callable[[FloatArray], ComplexArray]
 """From frequencies [rad/s], (k,), to L there, (k,), or that of n loops, (n, k)."""
@@ -47,13 +47,18 @@ class Margins:
     crossovers: FloatArray
     real_axis_crossings: FloatArray
 
+    @property
+    def delay_text(self) -> str:
+        """The further delay in words; a dash where it is beyond all that a plant has."""
+        return f"{1e3 * self.delay:.1f} ms" if self.delay <= LONGEST_DELAY else "-"
+
     def __str__(self) -> str:
         """Return the figures as a small tree."""
         return (
             f"Margins\n├ M_s {self.max_sensitivity:.3f} at {self.peak:.3g} rad/s\n"
             f"├ gain x {self.gain_down:.3g} .. {self.gain:.3g}\n"
             f"├ phase {np.degrees(self.phase):.1f} deg\n"
-            f"├ delay {self.delay * 1e3:.1f} ms\n└ disk {self.disk:.3f}"
+            f"├ delay {self.delay_text}\n└ disk {self.disk:.3f}"
         )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from models.basics import FloatArray, digits_apart
 from models.case import Case
-from models.sea import Scatter
+from models.sea import Scatter, breaking_height
 
 from ..design import Design
 from ..limits import Limit
@@ -77,6 +77,8 @@ class Operability:
         sea = f"H_s {self.case.sea.significant_height:.3g} m, T_p {period:.3g} s"
         if self.ok and limit >= at.main.highest:
             return f"nothing binds in the case's own sea, {sea}, nor in any looked at"
+        if self.ok and limit >= breaking_height(np.array(period)):
+            return f"nothing binds in the case's own sea, {sea}, nor below the steepest seas"
         verdict = "lies within the limit" if self.ok else "is beyond the limit"
         name = own.binding or ", ".join(own.broken)
         return f"the case's own sea, {sea}, {verdict}, H_s {limit:.3g} m, set by {name}"
@@ -202,13 +204,17 @@ class Operability:
 
 def _range_text(contour: Contour) -> str:
     """Return the range of a contour, and what binds it."""
-    finite = contour.limit[np.isfinite(contour.limit)]
-    if not finite.size:
+    if not np.isfinite(contour.limit).any():
         return f"nothing binds up to H_s {contour.highest:g} m"
-    names, counts = np.unique(contour.binding[contour.binding != ""], return_counts=True)
+    # Limits above the steepest seas bind nothing.
+    real = np.isfinite(contour.limit) & (contour.limit < breaking_height(contour.periods))
+    if not real.any():
+        return "nothing binds below the steepest seas"
+    limit = contour.limit[real]
+    names, counts = np.unique(contour.binding[real], return_counts=True)
     by = ", ".join(str(names[k]) for k in np.argsort(-counts))
-    high = f"{finite.max():.3g} m" if finite.size == contour.limit.size else "no limit"
-    return f"H_s {finite.min():.3g} m to {high}, set by {by}"
+    high = f"{limit.max():.3g} m" if real.all() else "the steepest seas"
+    return f"H_s {limit.min():.3g} m to {high}, set by {by}"
 
 
 def _figure(value: float) -> str:

@@ -23,7 +23,7 @@ from scipy.special import ndtr
 
 from models.basics import InputError, SolverError, check_ascending, check_range, one_thread
 from models.case import Case
-from models.sea import Scatter, SeaSeries, read_scatter
+from models.sea import SHORTEST, Scatter, SeaSeries, read_scatter
 
 from ..design import Design, limit_uses, shortfall, tuning_of
 from ..limits import Limit
@@ -216,7 +216,7 @@ def _diagram(given: Scatter | str | Path | None) -> Scatter | None:
 def _headings(case: Case, given: Sequence[float] | None) -> Sequence[float] | None:
     if given is None:
         return np.radians(np.arange(0.0, 360.0, _STEP)).tolist() if has_headings(case) else None
-    return _axis("headings", given, _MOST_HEADINGS, "rad", 2.0 * np.pi, open_high=True)
+    return _axis("headings", given, _MOST_HEADINGS, "rad", 0.0, 2.0 * np.pi, open_high=True)
 
 
 def _periods(
@@ -233,18 +233,18 @@ def _periods(
         if low >= high:
             return [low]
         return list(map(float, np.linspace(low, high, int(min(high - low, 40.0)) + 1)))
-    return _axis("periods", given, _MOST_PERIODS, "s", 60.0, open_low=True)
+    return _axis("periods", given, _MOST_PERIODS, "s", SHORTEST, 60.0)
 
 
 def _axis(
-    name: str, given: Sequence[float], most: int, unit: str, high: float, **ends: bool
+    name: str, given: Sequence[float], most: int, unit: str, low: float, high: float, **ends: bool
 ) -> list[float]:
-    """Return the values of an axis, ascending from zero to the ends that `check_range` is told."""
+    """Return the values of an axis, ascending, within the ends that `check_range` is told."""
     axis = check_ascending("operability", name, given)
     if axis.size == 0 or axis.size > most:
         raise InputError(f"operability: {name} must be 1 to {most}, got {axis.size}")
     return [
-        check_range("operability", name, v, low=0.0, high=high, unit=unit, **ends)
+        check_range("operability", name, v, low=low, high=high, unit=unit, **ends)
         for v in axis.tolist()
     ]
 

@@ -121,7 +121,7 @@ class Robustness:
         m = self.margins
         lines.append(
             f"└ disk margin {m.disk:.3g}, gain x {m.gain_down:.3g} to x {m.gain:.3g}, "
-            f"further delay {1e3 * m.delay:.4g} ms"
+            f"further delay {m.delay_text}"
         )
         return "\n".join(lines)
 

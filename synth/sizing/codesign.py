@@ -25,7 +25,16 @@ from models.case import Case
 from ..design import Design, optimise_gains
 from ..question import Problem
 from ..search import Progress
-from .follow import Answer, answer_of, asked_by, designed, follow, least_between, posed
+from .follow import (
+    Answer,
+    answer_of,
+    asked_by,
+    designed,
+    end_text,
+    follow,
+    least_between,
+    posed,
+)
 
 _GRID = 7  # gears that are tried before the Brent's method
 _FINE = 2e-3  # of the logarithm of the gear
@@ -171,7 +180,7 @@ def co_design(
             if search.cost(ratio * other, other) > (1.0 - _GAIN) * search.cost(best, r):
                 break
             r, best = other, _best_gear(search, low, high, other, near=ratio * other)
-    return _finished(search, best, r, given, (low, high))
+    return _finished(search, best, r, given, (low, high), radii)
 
 
 def gear_changes(case: Case, gear: float, radius: float | None = None) -> dict[str, float]:
@@ -212,7 +221,12 @@ def _cost_at(search: _Gears, ratio: float, radius: float) -> float:
 
 
 def _finished(
-    search: _Gears, gear: float, radius: float, given: float, ends: tuple[float, float]
+    search: _Gears,
+    gear: float,
+    radius: float,
+    given: float,
+    ends: tuple[float, float],
+    radii: tuple[float, float] | None,
 ) -> CoDesign:
     case, answer = search.case, search.at(gear, radius)
     points = tuple(
@@ -246,9 +260,11 @@ def _finished(
         text += f" instead of {1e3 * given:.4g} mm behind {case.winch.gearbox.ratio:g}"
     if binding:
         text += f"; {', '.join(binding)} bind"
-    if min(gear / ends[0], ends[1] / gear) < math.exp(2.0 * _FINE):
-        text += "; it stands at an end of the range"
-    else:
+    at_end = end_text("the gear", gear, ends, 2.0 * _FINE)
+    if radii is not None:
+        at_end += end_text("the drum", radius, radii, 2.0 * _FINE)
+    text += at_end
+    if not at_end:
         beside = [
             a for (g, r), a in sorted(search.answers.items()) if r == radius and a is not None
         ]

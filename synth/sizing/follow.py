@@ -8,6 +8,7 @@ descent begins at its neighbour's answer, where a few steps suffice.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -187,6 +188,17 @@ def designed(
     if answer is None:
         return None
     return verified(design_of(pose(case, structure, masses), answer.tuning), tell)
+
+
+def end_text(what: str, value: float, ends: tuple[float, float], fine: float) -> str:
+    """Return what is to be said of an answer at an end of its range: that it stands there.
+
+    Ends, and the answer, are positive numbers; it is one to `fine` of its logarithm.
+    """
+    at_end = min(value / ends[0], ends[1] / value) < math.exp(fine)
+    return (
+        f"; {what} stands at an end of the range, {ends[0]:.4g} to {ends[1]:.4g}" if at_end else ""
+    )
 
 
 def least_between(cost: Callable[[float], float], low: float, high: float, fine: float) -> float:

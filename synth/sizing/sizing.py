@@ -27,7 +27,7 @@ from ..loop import Assessment
 from ..question import HOOK, PAYLOAD, Problem
 from ..search import KEPT, Progress, search
 from .catalogue import ChosenMotor, choose, read_catalogue
-from .follow import Answer, designed, follow, least_between, posed
+from .follow import Answer, designed, end_text, follow, least_between, posed
 from .motor import MotorData, with_motor
 from .point import SizePoint, highest_sea, least_motor, target_of
 
@@ -51,7 +51,9 @@ class Sizing:
     status: str
     #: What the loop's margins and the sensors alone leave, with a motor without limits [m].
     unlimited_rms: float
-    points: tuple[SizePoint, ...] = ()  #: The smallest motor behind each gear, by ratio.
+    #: The smallest motor behind as many gears as were asked for, by ratio: the best one in the
+    #: place of the nearest.
+    points: tuple[SizePoint, ...] = ()
     #: The smallest of all; the case with it, its limits enforced; its gains, verified.
     chosen: SizePoint | None = None
     sized_case: Case | None = None
@@ -144,7 +146,7 @@ def size_winch(
     gear
         Lowest and highest ratio of the gear; by default the case's over and times 2.5.
     points
-        Gears on the curve.
+        Gears on the curve, over the whole range; the best takes the place of the nearest.
     motors
         A catalogue: a CSV file or its rows, see `synth.sizing.catalogue.read_catalogue`.
     starts, seed
@@ -192,7 +194,7 @@ def size_winch(
     )
     if isinstance(choice, str):
         return replace(sizing, ok=False, status=f"{sizing.status}; {choice}")
-    return _with_choice(sizing, structure, choice, used, tell)
+    return _with_choice(sizing, structure, choice, (low, high), used, tell)
 
 
 def _sized(
@@ -232,21 +234,49 @@ def _sized(
         tell=tell,
         found={},
     )
+    grid = np.geomspace(*gears, count)
     if free.payload_rms <= aim:
-        _walked(walk, np.geomspace(*gears, count))
+        _walked(walk, grid)
     given = _given(walk, question.problem)
+    least = min(walk.feasible, key=lambda point: point.scale, default=None)
     result = replace(
         empty,
-        points=tuple(walk.found[g] for g in sorted(walk.found)),
+        points=_curve(walk, grid, least),
         given_rms=given.payload_rms if given is not None else math.inf,
         highest_height=highest_sea(
             base, structure, target, masses=question.masses, near=given or free, tell=tell
         ),
     )
-    if not walk.feasible:
+    if least is None:
         return replace(result, status=_why_not(result, free)), question.masses, free
-    least = min(walk.feasible, key=lambda point: point.scale)
-    return _chosen(result, walk, least), question.masses, least.answer
+    return _chosen(result, walk, least, gears), question.masses, least.answer
+
+
+def _curve(walk: _Search, grid: FloatArray, least: SizePoint | None) -> tuple[SizePoint, ...]:
+    """Return the smallest motor, with its room, behind each gear of a grid, and behind the best."""
+    if not walk.found:
+        return ()
+    gears = [float(gear) for gear in grid]
+    if least is not None:
+        off = [abs(math.log(gear / least.gear)) for gear in gears]
+        gears[off.index(min(off))] = least.gear
+    lost = [point for point in walk.found.values() if not point.feasible]
+    points = []
+    for gear in gears:
+        if gear in walk.found:
+            points.append(_roomy(walk.case, walk.found[gear]))
+        else:  # beyond a gear that no motor can do, which was not looked at
+            near = min(lost, key=lambda point: abs(math.log(point.gear / gear)))
+            points.append(SizePoint(gear=gear, binding=near.binding))
+    return tuple(points)
+
+
+def _roomy(case: Case, point: SizePoint) -> SizePoint:
+    """Return a point with the motor a little larger than the smallest, if there is one."""
+    if not point.feasible:
+        return point
+    scale = point.scale * _ROOM
+    return replace(point, scale=scale, motor=MotorData.of(with_motor(case, scale, point.gear)))
 
 
 def _walked(walk: _Search, grid: FloatArray) -> None:
@@ -293,22 +323,23 @@ def _given(walk: _Search, problem: Problem) -> Answer | None:
     return follow(problem, [*known[:1], walk.free])
 
 
-def _chosen(sizing: Sizing, walk: _Search, point: SizePoint) -> Sizing:
+def _chosen(sizing: Sizing, walk: _Search, point: SizePoint, gears: tuple[float, float]) -> Sizing:
     """Return the sizing with the chosen motor, and with its gains, verified."""
-    answer = point.answer
+    answer, point = point.answer, _roomy(walk.case, point)
+    motor = point.motor
     assert answer is not None
-    scale = point.scale * _ROOM
+    assert motor is not None
     walk.tell("the gains of the chosen motor", 0, 1)
-    chosen_case = with_motor(walk.case, scale, point.gear).variant({"limits.drive": "enforce"})
+    chosen_case = with_motor(walk.case, point.scale, point.gear)
+    chosen_case = chosen_case.variant({"limits.drive": "enforce"})
     design = designed(chosen_case, walk.structure, answer, walk.masses, walk.tell)
-    motor = MotorData.of(chosen_case)
-    point = replace(point, scale=scale, motor=motor)
     met = design is not None and design.payload_rms <= sizing.target * (1.0 + KEPT)
     text = (
         f"the smallest motor has {1e-3 * motor.power:.4g} kW ({1e-3 * motor.torque_continuous:.4g} "
         f"kN m, {1e-3 * motor.torque_peak:.4g} kN m at the peak) behind a gear of "
         f"{point.gear:g}; {' and '.join(point.binding[:2])} bind"
     )
+    text += end_text("the gear", point.gear, gears, _FINE)
     if design is None:
         text += "; its gains could not be settled within its limits"
     elif not design.ok:
@@ -324,7 +355,12 @@ def _chosen(sizing: Sizing, walk: _Search, point: SizePoint) -> Sizing:
 
 
 def _with_choice(
-    sizing: Sizing, structure: str, choice: ChosenMotor, masses: int, tell: Progress
+    sizing: Sizing,
+    structure: str,
+    choice: ChosenMotor,
+    gears: tuple[float, float],
+    masses: int,
+    tell: Progress,
 ) -> Sizing:
     """Return the sizing with a motor out of the catalogue instead of one of any size."""
     design = designed(choice.case, structure, choice.answer, masses, tell)
@@ -333,6 +369,7 @@ def _with_choice(
         f"{choice.name} behind a gear of {choice.gear:g} is the smallest motor of the catalogue "
         f"that does it, with {100.0 * choice.spare:.3g} % of its limits to spare"
     )
+    text += end_text("the gear", choice.gear, gears, _FINE)
     return replace(
         sizing,
         ok=ok,

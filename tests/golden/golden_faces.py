@@ -47,7 +47,6 @@ CALLS = (
     "evaluate CASES/thesis-1975.yaml --no-bound --quiet --set limits.max_sensitivity=6",
     "evaluate CASES/thesis-1975.yaml --gains A=-200,a=50,a1=100,a2=100 --no-bound --quiet",
     "evaluate CASES/thesis-1975.yaml --gains A=x",
-    "evaluate CASES/subsea-crane.yaml",
     "margins CASES/thesis-1975.yaml --draws 10 --quiet",
     "margins CASES/thesis-1975.yaml --off payload.mass=2",
     "optimise CASES/thesis-1975.yaml --structure nonsense",

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics import FloatArray, InputError, binary_name, check_range, read_bytes
+from ...basics import FloatArray, InputError, binary_name, check_range, read_bytes, stl_facets
 from .hull import Hull, panel_areas
 
 FORMATS = (".stl", ".gdf", ".pnl", ".hst", ".mar")  #: Endings of the files that are read.
@@ -93,7 +93,7 @@ def read_hull(
 def _stl(owner: str, data: bytes) -> FloatArray:
     """Return the triangles of an STL file as panels (n, 4, 3)."""
     count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
-    if len(data) >= 84 and 84 + 50 * count == len(data) and count > 0:
+    if stl_facets(data):
         kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
         corners = np.frombuffer(data, dtype=kind, offset=84)["corners"].astype(np.float64)
     elif data.lstrip()[:5].lower() == b"solid":

@@ -2,14 +2,14 @@
 
 import argparse
 
-from ..declare import CASE, NAMED_DESIGN, NO_BOUND, options
+from ..declare import CASE, DESIGN, NO_BOUND, options
 from ..given import case_words, given_case
-from ..given_design import given_design
+from ..given_design import given_design, with_design
 from ..working import conclude, prepared, working
 
 ARGUMENTS = (
     CASE,
-    NAMED_DESIGN,
+    DESIGN,
     options("--out DIR  folder for the results (default: none)"),
     NO_BOUND,
 )
@@ -21,8 +21,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ...designs import design_data, design_report, write_report
 
     folder = None if arguments.out is None else prepared(arguments, case.name)
+    design = given_design(case, arguments)
     with working(arguments) as tell:
-        design = given_design(case, arguments, search=False)
         if folder is not None:
             write_report(folder, design=design, bound=arguments.bound, progress=tell)
     structure = "" if design.gains else f" --structure {design.structure}"
@@ -30,4 +30,5 @@ def run(arguments: argparse.Namespace) -> int:
         ("the best for this case", f"stillhook optimise {case_words(arguments, folder)}{structure}")
     ]
     report = design_report(design, bound=arguments.bound and not arguments.quiet)
+    report = with_design(report, design, case, arguments)
     return conclude(report, arguments, folder, again, result=design_data(design))

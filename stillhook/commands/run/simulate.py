@@ -171,8 +171,7 @@ def _with_design(
     asked: SimulationRequest, arguments: argparse.Namespace, folder: OutputFolder, stop: Stop
 ) -> SimulationRequest:
     """Return what is asked with a design for the feedback, the best if there is none."""
-    wanted = any(name.startswith("feedback") for name in asked.controllers)
-    if not wanted or names_design(asked.case, arguments):
+    if not _fed_back(asked) or names_design(asked.case, arguments):
         return asked
     from ...designs import best_design, design_text
 
@@ -183,6 +182,11 @@ def _with_design(
     if not design.parameters and not asked.every:
         raise SynthesisError(f"no design for the feedback: {design.status}")
     return replace(asked, design=design)
+
+
+def _fed_back(asked: SimulationRequest) -> bool:
+    """Return whether a controller is a design."""
+    return any(name.startswith("feedback") for name in asked.controllers)
 
 
 def _simulate(
@@ -250,7 +254,7 @@ def _show(
 ) -> None:
     out = console()
     report = runs_report([*found.compared.values()])
-    if asked.design is not None:
+    if _fed_back(asked):
         report = with_design(report, asked.design, asked.case, arguments)
     left = [
         f"left out: {error if name in str(error) else f'{name}: {error}'}"

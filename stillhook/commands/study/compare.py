@@ -11,12 +11,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from models import Case
 from models.basics import InputError
 
 from ...comparison import Comparison, comparison_report, write_comparison
 from ...text import Report, ReportSection, console, count, pairs, percent, quantity
 from ..declare import CASE, changed_words, options, within
 from ..given import case_words, given_case
+from ..given_design import lying_design
 from ..lists import names, numbers
 from ..working import conclude, counting, place_for, prepared, tidy
 
@@ -118,7 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
     report = comparison_report(found)
     # What the numbers say is the verdict.
     brief = [part for part in report.sections if part.items and isinstance(part.items[0], str)]
-    status = conclude(report, arguments, folder, _next(found, place, arguments), brief=brief)
+    status = conclude(report, arguments, folder, _next(case, found, place, arguments), brief=brief)
     if not found.complete:
         raise KeyboardInterrupt(
             f"{count(len(found.cells), 'run')} kept in {place}; the same command goes on"
@@ -146,13 +148,22 @@ def _first_answers(arguments: argparse.Namespace) -> Callable[[Comparison], None
     return tell
 
 
-def _next(found: Comparison, place: Path, arguments: argparse.Namespace) -> list[tuple[str, str]]:
+def _next(
+    case: Case, found: Comparison, place: Path, arguments: argparse.Namespace
+) -> list[tuple[str, str]]:
     words = case_words(arguments)
     rows = [("who took part, and what they know", "stillhook compare --list " + words)]
     if len(found.seeds) < _PLENTY:
         own = changed_words(arguments, ARGUMENTS, set=[], seeds=_PLENTY)
         more = " ".join(["stillhook compare", words, *map(shlex.quote, own)])
         rows.append((f"narrower intervals, from {_PLENTY} seeds", more))
+    lying = None
+    if arguments.design is None and arguments.controllers is None:
+        lying = lying_design(case)
+    if lying is not None:
+        own = changed_words(arguments, ARGUMENTS, set=[], design=lying)
+        again = " ".join(["stillhook compare", words, *map(shlex.quote, own)])
+        rows.append(("with the design that was optimised", again))
     if found.question.mismatch.text == "":
         off = shlex.quote(f"{place}-off")
         again = f"stillhook compare {words} --mismatch payload=+30% --out {off}"

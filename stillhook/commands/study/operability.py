@@ -73,6 +73,7 @@ ARGUMENTS = (
         --depths A,B,..  lengths of rope paid out [m], as in 100,500,1000 (default: the case's)
         --scatter FILE  scatter diagram (.csv): the share of the year that is workable; `example` is
             a made-up one
+        --rules  beside it the shares by the rules of thumb of the 1975 thesis
         --reoptimise  also find the gains anew for each sea (seconds for each)
         --highest LENGTH [30 m]  highest H_s looked at (default: 30 m)
         --out DIR  folder for the results (default: out/<case>-operability)
@@ -87,6 +88,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Find the contours, show and save them; return the exit status."""
     if arguments.held and (arguments.design or arguments.gains or arguments.reoptimise):
         raise InputError("operability: --held goes without --design, --gains and --reoptimise")
+    if arguments.rules and arguments.scatter is None:
+        raise InputError("operability: --rules goes with --scatter FILE")
     case = given_case(arguments)
     rule, seas = _asked(arguments)
     source = case if arguments.held else given_design(case, arguments)
@@ -127,7 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
         step("verify", 0, 1)
         checks = study.verify()
-        report = operability_report(study, checks)
+        report = operability_report(study, checks, rules=arguments.rules)
         if seas is not None:
             windows = weather_windows(
                 study,

@@ -36,7 +36,7 @@ from ..declare import OPTIONAL_CASE, changed_words, options, within
 from ..given import case_words, given_case, parse_options, split_pairs
 from ..given_design import design_words, given_design, with_design
 from ..lists import names
-from ..working import conclude, counting, place_for, tidy
+from ..working import conclude, counting, place_for, prepared, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,7 +53,7 @@ ARGUMENTS = (
     options(
         """
         who is tried:
-        --design FILE  a design that was written (design.yaml)
+        --design FILE  a design that was written, as in out/CASE/design.yaml
         | --gains A=..,a=..,a1=..,a2=..  gains, or parameters by name (default: the gains that the
             case has in use; else the best design is found, half a minute once)
         | --controller NAME  another controller, with --mode time, as in mpc (see `stillhook
@@ -274,13 +274,12 @@ def _number(text: str) -> float | str:
 def _concluded(swept: Swept, arguments: argparse.Namespace) -> int:
     """Write and print what the sweep says; return the exit status."""
     result, most = swept.result, arguments.worst
-    folder = OutputFolder(swept.folder)
+    folder = prepared(arguments, swept.folder)
     folder.keep(*write_sweep(swept.folder, result, worst=most))
     worst = worst_cases(result, most) if most else []
     law = _worst_design(swept, folder, worst)
-    if arguments.figures:
-        # Clouds of ten thousand points: as pixels, unless asked otherwise.
-        _figures(swept, folder, arguments.format or "png")
+    if folder.kinds:
+        _figures(swept, folder)
     report = sweep_report(result, swept.case.name, worst=most)
     following = _next(swept, worst, law, arguments)
     brief = report.sections[:1]
@@ -305,8 +304,8 @@ def _worst_design(swept: Swept, folder: OutputFolder, worst: list[int]) -> Path 
     )
 
 
-def _figures(swept: Swept, folder: OutputFolder, kind: str) -> None:
-    """Draw and write the figures."""
+def _figures(swept: Swept, folder: OutputFolder) -> None:
+    """Draw and write the figures, in the folder's kinds."""
     linear = isinstance(swept.design, Design)
     in_time = swept.result.attrs.get("mode") == "time"
     design: Any = swept.design if linear and not in_time else None
@@ -314,7 +313,8 @@ def _figures(swept: Swept, folder: OutputFolder, kind: str) -> None:
     if in_time:
         result = result.isel(case=~np.isin(result["status"].to_numpy(), UNKNOWN))
     for name, figure in sweep_figures(result, design).items():
-        folder.write(f"{name}.{kind}", picture(figure, kind))
+        for kind in folder.kinds:
+            folder.write(f"{name}.{kind}", picture(figure, kind))
 
 
 def _next(

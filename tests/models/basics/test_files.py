@@ -56,6 +56,10 @@ def test_a_file_is_read_up_to_a_size(tmp_path: Path) -> None:
         read_text(path, 1_000)
 
 
+#: Two facets, and a header that begins as a text file in the same format does.
+STL = b"solid hull".ljust(80) + (2).to_bytes(4, "little") + bytes(100)
+
+
 @pytest.mark.parametrize(
     ("content", "name"),
     [
@@ -69,6 +73,7 @@ def test_a_file_is_read_up_to_a_size(tmp_path: Path) -> None:
         ("a: 1\n".encode("utf-16"), "a text in UTF-16: save it as UTF-8"),
         (b"\x89HDF\r\n\x1a\n", "an HDF5 or NetCDF file"),
         (b"MATLAB 5.0 MAT-file", "a MATLAB file"),
+        (STL, "a binary STL file: meshes of hulls go to `stillhook vessel hull --mesh`"),
     ],
 )
 def test_a_binary_is_named_for_what_it_is(content: bytes, name: str, tmp_path: Path) -> None:

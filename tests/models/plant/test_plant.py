@@ -590,3 +590,10 @@ def test_unknown_parameters_and_negative_drag_are_refused() -> None:
         plant.linearise(drag=-1.0)
     with pytest.raises(InputError, match=r"payload\.virtual_mass must be a finite number, got nan"):
         plant.operating_point({"payload.virtual_mass": math.nan})
+
+
+@pytest.mark.parametrize("path", ["sensors.payload.bandwidth", "sensors.telemetry.bandwidth"])
+def test_the_fastest_filter_of_a_case_leaves_an_operating_point(path: str) -> None:
+    """A filter of 10 000 rad/s makes of rounding a rate of 5e-9 m/s2, which is no residual."""
+    case = load_case("thesis-1975").replace({path: 1e4})
+    assert build_plant(PlantData.from_case(case)).operating_point().residual < 1e-10

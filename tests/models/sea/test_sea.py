@@ -417,7 +417,7 @@ def test_a_measured_sea_has_the_energy_of_its_table(gap, seed, beyond):
         ({"significant_period": 8.0}, r"takes peak_period \[s\], not significant_period"),
         ({"gamma": 0.5}, r"gamma must be in \[1, 7\], got 0.5"),
         ({"kind": "tma"}, r"tma needs depth \[m\]"),
-        ({"kind": "tma", "depth": -3.0}, "depth must be above 0 m, got -3.0"),
+        ({"kind": "tma", "depth": -3.0}, "depth must be at least 1 m, got -3.0"),
         ({"depth": 20.0}, r"jonswap takes peak_period \[s\], not depth"),
         ({"kind": "gaussian-swell", "width": 0.3}, r"width must be in \[0.00392.*, 0.1309.*rad/s"),
         ({"kind": "pierson-moskowitz"}, "takes no period, not peak_period"),

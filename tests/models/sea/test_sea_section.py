@@ -176,6 +176,10 @@ def test_spreading(crane):
             },
             r"sea.width: must be in \[0.00314159, 0.10472\] rad/s, got 0.62",
         ),
+        (
+            {"spectrum": "tma", "significant_height": 2, "peak_period": 8, "depth": "1 um"},
+            r"sea.depth: must be a length in \[1, 12000\] m, got '1 um'",
+        ),
         ({"spectrum": "measured"}, "sea.table: is missing: the measured spectrum needs a table or"),
         (
             {"spectrum": "measured", "table": {"omega": [1, 2, 2], "density": [1, 1, 1]}},

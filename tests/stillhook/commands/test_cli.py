@@ -458,12 +458,6 @@ WRONG_WORDS = {
         "evaluate thesis-1975 --gains a=1",
         "--gains: a1 and a2 must be given too, got 'a=1'",
     ),
-    "no gains at all": (
-        "evaluate subsea-crane",
-        "subsea-crane: gains: the case has none in use; give them, as in "
-        "--gains A=1,a=0,a1=0,a2=0.5, or --design with a design.yaml that `stillhook optimise` "
-        "wrote",
-    ),
     "no starts": (
         "optimise thesis-1975 --starts 0",
         r"optimise: --starts must be in \[1, 4096\], got 0",

@@ -67,6 +67,22 @@ def test_json_wins_over_quiet(capsys):
     assert told(capsys, "check", "thesis-1975", "--quiet")["sections"]
 
 
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        ("cases", "thesis-1975"),
+        ("scenarios", "landing"),
+        ("vessel list", "osv-83m"),
+        ("compare thesis-1975 --list", "clairvoyant"),
+    ],
+)
+def test_a_list_is_told_quietly_too(capsys, command, name):
+    assert main([*command.split(), "--quiet"]) == 0
+    out = capsys.readouterr().out
+    assert name in out
+    assert "Next:" not in out
+
+
 def test_json_of_runs_holds_every_controller(capsys):
     words = ("simulate", *CALM, "--controller", "feed-forward,none", "--duration", "30 s")
     data = told(capsys, *words, "--no-figures", "--traces", "none", "--out", "here")
@@ -78,8 +94,10 @@ def test_json_of_runs_holds_every_controller(capsys):
     [((), {".svg", ".png"}), (("--format", "svg"), {".svg"}), (("--no-figures",), set())],
     ids=["both", "svg", "none"],
 )
-def test_figures_are_drawn_as_asked(asked, endings):
-    main(["evaluate", *CALM, "--gains", GAINS, "--no-bound", "--quiet", "--out", "here", *asked])
+@pytest.mark.parametrize("command", ["evaluate --no-bound", "sweep --samples 16"])
+def test_figures_are_drawn_as_asked(command, asked, endings):
+    name, *words = command.split()
+    main([name, *CALM, *words, "--gains", GAINS, "--quiet", "--out", "here", *asked])
     drawn = {path.suffix for path in Path("here").iterdir()} & {".svg", ".png", ".pdf"}
     assert drawn == endings
 

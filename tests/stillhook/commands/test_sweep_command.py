@@ -31,7 +31,7 @@ def test_a_sweep_in_time_is_written_and_told(tmp_path, capsys):
     assert "6 of 6 cases hold the payload: 100 % (95 % interval 54.07 to 100 %)" in out
     names = {path.name for path in folder.iterdir()}
     assert names >= {"result.nc", "journal.jsonl", "cases.csv", "cases.parquet", "spread.yaml"}
-    assert names >= {"summary.json", "worst.yaml", "worst-5.yaml", "scatter.png"}
+    assert names >= {"summary.json", "worst.yaml", "worst-5.yaml", "scatter.png", "scatter.svg"}
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["stable"]["count"] == 6
     assert summary["quantiles"]["payload_rms"]["unit"] == "m"

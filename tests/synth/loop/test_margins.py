@@ -42,6 +42,14 @@ def test_delayed_integrator_has_the_closed_form() -> None:
     assert m.phase == pytest.approx(np.pi / 2.0 - k * tau, rel=1e-9)
 
 
+@pytest.mark.parametrize(("k", "text"), [(2.0, "785.4 ms"), (0.001, "-"), (0.0, "-")])
+def test_a_delay_margin_that_no_plant_has_is_a_dash(k: float, text: str) -> None:
+    """An integrator k/s stands pi/(2 k): 1571 s mean nothing."""
+    m = margins_of([k], [1.0, 0.0]) if k else margins_of([0.5], [1.0, 1.0])
+    assert m.delay_text == text
+    assert f"delay {text}\n" in str(m)
+
+
 def test_first_order_lag_has_margins_without_bound() -> None:
     # gain 0.5: |L| < 1 throughout
     m = margins_of([0.5], [1.0, 1.0])

@@ -667,6 +667,10 @@ def test_what_cannot_be_asked_is_refused() -> None:
         operability(case, payload_rms=0.0)
     with pytest.raises(InputError, match="periods must be strictly ascending"):
         operability(case, periods=[8.0, 7.0])
+    with pytest.raises(
+        InputError, match=r"operability: periods must be in \[0.5, 60\] s, got 1e-09"
+    ):
+        operability(case, periods=[1e-9, 7.0])
     with pytest.raises(InputError, match="reoptimise begins at a design"):
         operability(case, reoptimise=True)
     with pytest.raises(InputError, match="less than the 9000 m paid out"):

@@ -26,7 +26,8 @@ from stillhook.seas import (
     heading_figure,
     scatter_figure,
 )
-from stillhook.seas.operability import netcdf
+from stillhook.seas.operability import netcdf, operability_report
+from stillhook.text import Table
 from synth.operability import Contour, Operability, operability
 from synth.operability.contour import heading_shares
 from synth.operability.criteria import Stability
@@ -238,6 +239,37 @@ def test_the_tree_and_the_table_hold_every_contour() -> None:
         assert float(row[height]) == pytest.approx(lowest)
 
 
+def test_tables_end_where_figures_do_at_the_steepest_seas() -> None:
+    """At 6 s seas of more than 3.75 m break, at 9 s of 7.9 m, at 12 s of 11.56 m."""
+    (at,) = study().depths
+    heights = np.full_like(at.contours["loop"].heights, np.inf)
+    heights[0] = 24.0, 2.0, 30.0
+    steep = replace(at, contours={**at.contours, "loop": replace(at.main, heights=heights)})
+    tall = replace(study(), depths=(steep,))
+    (table,) = [
+        item
+        for section in operability_report(tall).sections
+        for item in section.items
+        if isinstance(item, Table) and item.headings[0] == "T_p"
+    ]
+    names = [column.name for column in table.columns]
+    loop = names.index("loop")
+    first = at.main.criteria[0].name.removeprefix("motor.")
+    assert [row[loop : loop + 2] for row in table.rows] == [
+        (">3.75", "steepest seas"),
+        ("2.00", first),
+        (">11.56", "steepest seas"),
+    ]
+    assert f"H_s 2 m to the steepest seas, set by {at.main.criteria[0].name}" in str(tall)
+
+
+@pytest.mark.parametrize("rules", [False, True])
+def test_rules_of_thumb_are_told_where_asked(rules: bool) -> None:
+    items = [i for s in operability_report(study(), rules=rules).sections for i in s.items]
+    told = [i for i in items if isinstance(i, Table) and "rules of thumb" in i.headings[0]]
+    assert len(told) == int(rules)
+
+
 @pytest.mark.parametrize("kind", ["contour", "capability", "scatter", "headings", "depths"])
 def test_every_figure_can_be_drawn(kind: str) -> None:
     from stillhook.text import picture
@@ -304,6 +336,8 @@ def test_the_command_refuses_in_one_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = ["--out", str(tmp_path)]
+    assert main(["operability", "thesis-1975", "--rules", *out]) == 2
+    assert "--rules goes with --scatter" in capsys.readouterr().err
     assert main(["operability", "thesis-1975", "--held", "--reoptimise", *out]) == 2
     assert "--held goes without" in capsys.readouterr().err
     assert main(["operability", "thesis-1975", "--headings", "0..90", *out]) == 2

@@ -134,8 +134,27 @@ def test_the_curve_falls_to_the_chosen_gear_and_rises_behind_it(sizing: Sizing) 
     assert all(a >= b for a, b in itertools.pairwise(scales[: at + 1]))
     assert all(a <= b for a, b in itertools.pairwise(scales[at:]))
     assert sizing.points[0].binding[0].startswith("motor.")
+    assert len(scales) == 3
+    assert sizing.chosen is not None
+    assert min(scales) == sizing.chosen.scale  # the motor that the status tells
+    assert "end of the range" not in sizing.status
     text = sizing.to_csv()
     assert text.count("\n") == len(sizing.points) + 1
+
+
+def test_an_answer_at_the_end_of_the_range_says_so(case: sh.Case) -> None:
+    found = sh.size_winch(case, target=TARGET, gear=(24.0, 26.0), points=4, starts=1)
+    assert found.ok
+    assert "; the gear stands at an end of the range, 24 to 26" in found.status
+    assert [point.gear for point in found.points] == pytest.approx(
+        [24.0, 24.649, 25.315, 26.0], 1e-4
+    )
+
+
+def test_gears_beyond_one_that_no_motor_can_do_are_told_too(case: sh.Case) -> None:
+    found = sh.size_winch(case, target=TARGET, gear=(24.0, 60.0), points=6, starts=1)
+    assert len(found.points) == 6
+    assert [point.binding for point in found.points[-3:]] == [("motor.inertia",)] * 3
 
 
 @pytest.mark.slow
