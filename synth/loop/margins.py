@@ -7,6 +7,7 @@ grid's spacing.  Evaluations are dear one by one and cheap together: all places 
 once, several nodes at a time.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -47,11 +48,16 @@ class Margins:
     crossovers: FloatArray
     real_axis_crossings: FloatArray
 
+    @property
+    def most_gain(self) -> str:
+        """By how much the gain may grow, in words."""
+        return "without bound" if math.isinf(self.gain) else f"x {self.gain:.3g}"
+
     def __str__(self) -> str:
         """Return the figures as a small tree."""
         return (
             f"Margins\n├ M_s {self.max_sensitivity:.3f} at {self.peak:.3g} rad/s\n"
-            f"├ gain x {self.gain_down:.3g} .. {self.gain:.3g}\n"
+            f"├ gain x {self.gain_down:.3g} to {self.most_gain}\n"
             f"├ phase {np.degrees(self.phase):.1f} deg\n"
             f"├ delay {self.delay * 1e3:.1f} ms\n└ disk {self.disk:.3f}"
         )
