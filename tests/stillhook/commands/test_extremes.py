@@ -44,8 +44,14 @@ SEARCHES = (
     "bound CASE",
     "simulate CASE --controller mpc --duration '20 s'",
 )
-#: Of a case with a motion reference unit.
-FORWARD = ("optimise CASE --structure feed-forward",)
+#: Of the crane, whose searches all together take too long for so many cases.
+OF_THE_CRANE = (
+    "optimise CASE --structure feed-forward --no-bound",
+    "simulate CASE --controller mpc --duration '20 s'",
+)
+#: What takes minutes, as docs/mpc.md says: a telegram of 5 s ago is a model of hundreds of states.
+LONG = ("delay of 5 s", "--controller mpc")
+
 #: Commands that take no case of one's own with a load, a rope and a winch.
 NONE = ("scenarios", "sea", "vessel import", "vessel hull", "vessel list", "cases", "new", "schema")
 
@@ -110,6 +116,6 @@ def test_extremes_are_studied(name, tmp_path):
 @pytest.mark.parametrize("name", [*SINGLE, *PAIRS])
 @pytest.mark.parametrize("base", ["thesis-1975", "subsea-crane"])
 def test_extremes_are_simulated_and_designed_for(base, name, tmp_path):
-    case = kept(tmp_path, base, name)
-    lines = (*SEARCHES, *(IN_TIME if base == "thesis-1975" else FORWARD))
-    assert wrong_with(tmp_path, questions(lines, case)) == []
+    lines = (*IN_TIME, *SEARCHES) if base == "thesis-1975" else OF_THE_CRANE
+    lines = [line for line in lines if not (LONG[0] in name and LONG[1] in line)]
+    assert wrong_with(tmp_path, questions(lines, kept(tmp_path, base, name))) == []
