@@ -59,12 +59,12 @@ NOT_A_NUMBER = re.compile(r"(?<![\w.-])[+-]?(nan|inf|NaN|Infinity|None)(?![\w-])
 
 
 def wrong_with(folder: Path, lines: Iterable[str]) -> list[str]:
-    """Ask all lines; return what is no answer: a crash, too long, no number, no sentence."""
+    """Ask all lines; return what is no answer: a crash, a warning of Python's, no number."""
     found = []
     for line, ending, used in asked(lines, folder, seconds=SECONDS):
         status, out, err = ending.status, ending.out, ending.err
         said = f"{line}: status {status} after {used:.0f} s: {err.strip()[-300:]}"
-        if status not in (0, 1, 2) or "Traceback" in err:
+        if status not in (0, 1, 2) or "Traceback" in err or "Warning: " in err:
             found.append(said)
         elif not (out.strip() if status == 0 else f"{out}{err}".strip()):
             found.append(f"{said}: said nothing")
