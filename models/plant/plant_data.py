@@ -426,9 +426,9 @@ def masses_for_bandwidth(data: PlantData, omega_max: float) -> int:
             if np.all(np.abs(lumped / exact - 1.0) <= MODE_TOLERANCE):
                 return n
     raise InputError(
-        f"rope: {MAX_MASSES} masses hold fewer axial modes than lie below {omega_max:.4g} rad/s "
-        f"on {data.rope_length:g} m of rope (about {count - 1}); a loop as fast as that cannot be "
-        "designed on a lumped rope: lower its bandwidth or set rope.masses"
+        f"rope: {MAX_MASSES} masses do not hold the {count - 1} or so axial modes that lie below "
+        f"{omega_max:.4g} rad/s on {data.rope_length:g} m of rope; a loop as fast as that cannot "
+        "be designed on a lumped rope: lower its bandwidth or set rope.masses"
     )
 
 

@@ -23,9 +23,12 @@ _LOOKED = 16  # samples from one look at that to the next
 
 
 def known(P: FloatArray) -> FloatArray:
-    """Return the standard deviations of a covariance, (n,), one where there is none."""
-    sizes = np.sqrt(np.diag(P))
-    return np.where(sizes > 0.0, sizes, 1.0)
+    """Return the standard deviations of a covariance, (n,), one where there is none.
+
+    Rounding may leave what is certain a variance a hair below zero.
+    """
+    variances = np.diag(P)
+    return np.sqrt(np.where(variances > 0.0, variances, 1.0))
 
 
 def prediction_covariance(

@@ -148,7 +148,9 @@ def recipe_from(about: Mapping[str, Any]) -> Recipe:
 def feedback(name: str, case: Case, design: StoredDesign | None) -> Controller:
     """Return the linear feedback of a design."""
     if design is None or not design.found:
-        raise InputError("no design was found" if design is None else design.status)
+        raise InputError(
+            "no design was found" if design is None else f"the design has no law: {design.status}"
+        )
     return feedback_of(name, case, design.law)
 
 

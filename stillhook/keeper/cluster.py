@@ -12,6 +12,7 @@ import functools
 import os
 import pickle
 import queue
+import sys
 import threading
 import time as clock
 import uuid
@@ -181,13 +182,22 @@ class Cluster(Pool):
 
 @contextlib.contextmanager
 def _isolated() -> Iterator[None]:
-    """Let Python processes that start meanwhile find nothing in the current folder."""
+    """Let Python processes that start meanwhile find nothing in the current folder.
+
+    Those of `multiprocessing` are sent the path of this one, in which the current folder is an
+    empty text at a prompt and in a notebook; it is taken out for as long, because a worker that
+    was killed is started anew.
+    """
     before = {name: os.environ.get(name) for name in ("PYTHONSAFEPATH", "PYTHONPATH")}
     found = full_paths((before["PYTHONPATH"] or "").split(os.pathsep))
     os.environ.update(PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join(found))
+    path = sys.path[:]
+    sys.path[:] = full_paths(path)
     try:
         yield
     finally:
+        more = [entry for entry in sys.path if entry not in path]  # which others have put there
+        sys.path[:] = [*path, *more]
         for name, value in before.items():
             os.environ.pop(name)
             if value is not None:

@@ -71,7 +71,8 @@ class Series:
 
         A snap is a wave in the rope, which few masses blunt: the run is repeated with the same
         seed on as many masses as there may be, and says both loads.  Not where every sample asks
-        a controller in Python, which would take its time again.
+        a controller in Python, which would take its time again; nor on a rope so short that its
+        waves are faster than a run can follow, where few masses blunt nothing.
         """
         runs, simulation = list(found), self.simulation
         loads = [run.statistics.quantities.get("snap load") for run in runs]
@@ -85,7 +86,10 @@ class Series:
         if not simulation.fused or masses >= MAX_MASSES:
             return runs
         options = replace(simulation.options, masses=MAX_MASSES, step=None)
-        finer = prepare(simulation.case, simulation.controller, simulation.scenario, options)
+        try:
+            finer = prepare(simulation.case, simulation.controller, simulation.scenario, options)
+        except InputError:
+            return runs
         again = run_simulation(finer, seed=runs[at].seed)
         if again.status != runs[at].status:
             return runs

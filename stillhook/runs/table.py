@@ -108,6 +108,8 @@ class QuantityRow:
         (_, low, high), factor = self.figures[at], self._scale[0]
         if math.isnan(low) or math.isnan(high):
             return ""
+        if math.isinf(high):  # nothing speaks against any more: a single loss, at once
+            return f"at least {number(low / factor)}"
         return f"{number(low / factor)} to {number(high / factor)}"
 
     @property

@@ -99,8 +99,13 @@ class OutputFolder:
     def claim(self, *paths: Path) -> None:
         """List files before they are written, so that they are known though a run is killed.
 
+        A folder that somebody has removed since it was prepared is made again: what was computed
+        meanwhile is worth more than their order.
+
         Raises InputError if that cannot be written.
         """
+        if not self.path.is_dir():
+            self.prepare(self.path)
         if not self.listing:
             return
         tops = dict.fromkeys(path.relative_to(self.path).parts[0] for path in paths)

@@ -194,8 +194,10 @@ def _bound(
     attained = sum(w * loop.variances[name] for name, w in minimise.items())
     prices = point.multipliers * np.array(list(limits.values())) ** 2
     kept = all(rms[name] <= _BROKEN * bound for name, bound in limits.items())
-    # Multipliers that grow without end while a limit stays broken: the dual is unbounded.
-    hopeless = not kept and float(prices.max()) > 1e3 * max(attained, 1e-300)
+    # Multipliers that grow without end while a limit stays broken: the dual is unbounded.  They are
+    # held against the model's own cost: the true loop of a controller that spares nothing to keep
+    # the limits may be a thousand times as bad.
+    hopeless = not kept and float(prices.max()) > 1e3 * max(dual.primal(point), 1e-300)
     late = {
         f"{1e3 * d:g} ms": [
             n for n, t in zip(plant.measurements, plant.delays, strict=True) if t == d

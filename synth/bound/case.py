@@ -159,6 +159,8 @@ class BestPossible:
             f"no linear controller does better than {least} whatever its margins "
             f"(its LQG has M_s {self.free_sensitivity:.2g})"
         ]
+        if self.free.value == 0.0:
+            said = ["nothing is known of the best: the models of sea and delays miss too much"]
         found = self.found
         if isinstance(found, str):
             said.append(f"none found within M_s {self.max_sensitivity:.3g}: {found}")
@@ -172,7 +174,7 @@ class BestPossible:
             said.append(
                 f"the best found at M_s {self.max_sensitivity:.3g} with order "
                 f"{found.order}: {1e3 * found.rms:.3g} mm (gain x {m.gain_down:.2g} to "
-                f"x {m.gain:.3g}, phase {math.degrees(m.phase):.0f} deg, delay "
+                f"{m.most_gain}, phase {math.degrees(m.phase):.0f} deg, delay "
                 f"{1e3 * m.delay:.0f} ms)"
             )
         if self.rms is not None:

@@ -371,7 +371,8 @@ def _solve(problem: Any, q: Any) -> None:
             warnings.simplefilter("ignore", UserWarning)
             problem.solve(solver=cp.CLARABEL)
     except cvxpy.error.SolverError as error:
-        raise SolverError(f"Youla: Clarabel failed: {error}") from error
+        # Its own words advise on how to call it, which nobody here does.
+        raise SolverError("Youla: Clarabel found no answer, for want of digits") from error
     if q.value is None or problem.status not in ("optimal", "optimal_inaccurate"):
         raise SynthesisError(f"Youla: no controller with {q.size} free numbers keeps the limits")
 

@@ -283,7 +283,7 @@ class Design:
             m = self.margins
             lines.append(
                 f"├ M_s {m.max_sensitivity:.3g}, phase {np.degrees(m.phase):.1f} deg, "
-                f"gain x {m.gain_down:.3g} to x {m.gain:.3g}, delay {m.delay_text}"
+                f"gain x {m.gain_down:.3g} to {m.most_gain}, delay {m.delay_text}"
             )
         for u in self.limits.values():
             kind = "" if u.enforced else " (reported only)"

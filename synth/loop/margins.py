@@ -7,6 +7,7 @@ grid's spacing.  Evaluations are dear one by one and cheap together: all places 
 once, several nodes at a time.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -52,11 +53,16 @@ class Margins:
         """The further delay in words; a dash where it is beyond all that a plant has."""
         return f"{1e3 * self.delay:.1f} ms" if self.delay <= LONGEST_DELAY else "-"
 
+    @property
+    def most_gain(self) -> str:
+        """By how much the gain may grow, in words."""
+        return "without bound" if math.isinf(self.gain) else f"x {self.gain:.3g}"
+
     def __str__(self) -> str:
         """Return the figures as a small tree."""
         return (
             f"Margins\n├ M_s {self.max_sensitivity:.3f} at {self.peak:.3g} rad/s\n"
-            f"├ gain x {self.gain_down:.3g} .. {self.gain:.3g}\n"
+            f"├ gain x {self.gain_down:.3g} to {self.most_gain}\n"
             f"├ phase {np.degrees(self.phase):.1f} deg\n"
             f"├ delay {self.delay_text}\n└ disk {self.disk:.3f}"
         )

@@ -13,7 +13,7 @@ The length changes slowly against the loop: each length is a loop of its own.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,6 +33,7 @@ from .family_plants import FamilyPlants
 from .worst_case import Figures, exact_figures
 
 LENGTH = "rope.length"
+_FORMAT = 1  # version of the file
 KEPT_BETWEEN = 1e-3  # relative excess over a limit that counts as kept between the nodes
 _MOST_NODES = 9
 _MOST_ROUNDS = 12
@@ -82,8 +83,11 @@ class GainSchedule:
                 f"gain schedule: must have one row of {len(self.names)} gains for each length, got "
                 f"{gains.shape} for {lengths.shape}"
             )
-        if np.any(np.diff(lengths) <= 0.0) or lengths[0] <= 0.0 or not np.isfinite(gains).all():
-            raise InputError("gain schedule: lengths must ascend from above 0, gains be finite")
+        finite = np.isfinite([*lengths, *gains.ravel(), self.amplifier]).all()
+        if not finite or lengths.min() <= 0.0 or np.any(np.diff(np.log(lengths)) <= 0.0):
+            raise InputError(
+                "gain schedule: lengths must ascend from above 0, and all numbers be finite"
+            )
         object.__setattr__(self, "lengths", read_only(lengths))
         object.__setattr__(self, "gains", read_only(gains))
 
@@ -116,7 +120,7 @@ class GainSchedule:
         rows = [[float(v) for v in row] for row in self.gains]
         return yaml_text(
             {
-                "stillhook_schedule": 1,
+                "stillhook_schedule": _FORMAT,
                 "case": self.case.name,
                 "over": LENGTH,
                 "interpolation": "cubic spline in log(length), linear between two nodes",
@@ -135,18 +139,26 @@ class GainSchedule:
         from models.casefile import read_yaml
 
         data, _ = read_yaml(text, source)
+        if not isinstance(data, Mapping) or not isinstance(data.get("gains"), Mapping):
+            raise InputError(f"{source}: is not a gain schedule: it has no section gains")
         try:
-            names = tuple(data["gains"])
+            for key, wanted in (("stillhook_schedule", _FORMAT), ("over", LENGTH)):
+                if data[key] != wanted:
+                    raise InputError(f"{key} must be {wanted}, got {data[key]!r}")
+            names = tuple(str(name) for name in data["gains"])
             return cls(
                 case=case,
                 lengths=np.array(data["lengths"], dtype=np.float64),
-                gains=np.array([data["gains"][n] for n in names], dtype=np.float64).T,
+                gains=np.array(list(data["gains"].values()), dtype=np.float64).T,
                 names=names,
                 amplifier=float(data["amplifier"]),
                 status="read from a file; not checked",
             )
-        except (KeyError, TypeError, ValueError) as error:
+        # An InputError is a ValueError: what is wrong with the numbers is told of the file.
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{source}: is not a gain schedule: {error}") from error
+        except KeyError as error:
+            raise InputError(f"{source}: is not a gain schedule: {error} is missing") from error
 
     def __str__(self) -> str:
         """Return a small tree."""

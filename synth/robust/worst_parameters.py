@@ -120,7 +120,7 @@ class Robustness:
             lines.append(f"├ gains: {self.gain_radius}")
         m = self.margins
         lines.append(
-            f"└ disk margin {m.disk:.3g}, gain x {m.gain_down:.3g} to x {m.gain:.3g}, "
+            f"└ disk margin {m.disk:.3g}, gain x {m.gain_down:.3g} to {m.most_gain}, "
             f"further delay {m.delay_text}"
         )
         return "\n".join(lines)

@@ -24,6 +24,7 @@ from mpc.programme import (
     lq_regulator,
     prediction_covariance,
 )
+from mpc.programme.kalman import known
 
 N, NX, NW, NC, NH = 9, 3, 2, 2, 4
 BLOCKS = (1, 2, 2, 4)
@@ -256,6 +257,10 @@ def test_the_covariance_of_the_prediction_is_that_of_the_recursion(rng):
         P = A @ corrected(P, C, R, kalman_gain(C, R, P)) @ A.T + G @ G.T
     found = prediction_covariance(A, C, G, R, np.array([1.0, 30.0, 0.2]))
     np.testing.assert_allclose(found, P, rtol=1e-9, atol=1e-9 * np.abs(P).max())
+
+
+def test_what_is_certain_has_a_size_of_one_though_rounding_left_less_than_nothing() -> None:
+    assert known(np.diag([4.0, 0.0, -1e-25])).tolist() == [2.0, 1.0, 1.0]
 
 
 def test_what_is_missing_has_no_gain_and_leaves_that_of_the_others(rng):

@@ -78,14 +78,14 @@ def test_the_table_fits_a_terminal_and_says_what_came_of_it(run):
         "rating 5.94 kN m",
         "limit 1200 rpm",
         "no extremes of the payload: they take 8 blocks of 20 min, these runs have 0",
-        "step 10.0 ms, sample 10.0 ms",
+        "step 5.00 ms, sample 5.00 ms",
     ):
         assert text in table, text
     assert after.startswith("summary.md, summary.json, events.csv, 2 time traces of ")
 
 
 def test_the_rms_of_the_table_is_that_of_the_traces(run):
-    words = ("--settle", "10 s", "--store-step", "10 ms", "--traces", "csv", "--out", "here")
+    words = ("--settle", "10 s", "--store-step", "5 ms", "--traces", "csv", "--out", "here")
     run("simulate", *CALM, *SHORT, *words)
     with open("here/runs/seed-000.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 import sweep_pilots
-from designs import PERFECT_MRU, thesis_design
+from designs import PERFECT_MRU, thesis_design, unstable_design
 
 import stillhook as sh
 from models.basics import InputError
@@ -31,6 +31,11 @@ def answers(controller):
     controller.reset()
     shown = np.random.default_rng(3).standard_normal((4, len(HEARD)))
     return [controller.step(Measurement(row), 0.01 * i) for i, row in enumerate(shown)]
+
+
+def test_a_design_without_a_law_is_named_with_what_is_wrong():
+    with pytest.raises(InputError, match=r"^the design has no law: unstable: grows by a factor e"):
+        recipe_of(unstable_design(), "sweep").controller(CASE)
 
 
 def test_a_recipe_that_was_stored_makes_the_same_controller():

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from multiprocessing import spawn
 from pathlib import Path
 from typing import Any
 
@@ -91,10 +92,50 @@ def test_a_cluster_starts_nothing_of_the_current_folder(
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", ".", str(planted / "full")]))
     monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+    # As at a prompt and in a notebook, where `multiprocessing` hands the folder itself on.
+    path = ["", ".", *sys.path]
+    monkeypatch.setattr(sys, "path", path.copy())
+    monkeypatch.setattr("multiprocessing.process.ORIGINAL_DIR", str(planted))
     with _isolated():
         child = subprocess.run([sys.executable, "-c", "import json"], capture_output=True)
+        handed = spawn.get_preparation_data("worker")["sys_path"]
         assert os.environ["PYTHONPATH"] == str(planted / "full")
+        sys.path.append("/put/there/meanwhile")
     assert child.returncode == 0
     assert not (planted / "was-run").exists()
+    assert handed == path[2:]
+    assert sys.path == [*path, "/put/there/meanwhile"]
     assert os.environ["PYTHONPATH"] == os.pathsep.join(["", ".", str(planted / "full")])
     assert "PYTHONSAFEPATH" not in os.environ
+
+
+NOTEBOOK = """
+import sys, warnings
+from models.spread import Uniform
+import stillhook as sh
+import distributed
+
+if __name__ == "__main__":  # workers of a cluster run the script that started them
+    warnings.simplefilter("ignore")
+    sys.path.insert(0, "")
+    case = sh.load_case("thesis-1975")
+    spread = {"payload.mass": Uniform("1 %")}
+    how = {"mode": "time", "samples": 2, "duration": 2.0, "engine": "local:2"}
+    print(sh.sweep("none", spread, case=case, **how).attrs["engine"])
+"""
+
+
+@pytest.mark.slow  # a cluster takes its time to start
+def test_a_clusters_workers_run_nothing_of_a_notebooks_folder(
+    planted: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    pytest.importorskip("distributed")
+    for name in ("distributed", "numpy", "pickle"):
+        (planted / f"{name}.py").write_text((planted / "json.py").read_text())
+    script = tmp_path_factory.mktemp("elsewhere") / "notebook.py"
+    script.write_text(NOTEBOOK)
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=planted, capture_output=True, text=True, timeout=300
+    )
+    assert not (planted / "was-run").exists()
+    assert (done.returncode, done.stdout) == (0, "cluster\n"), done.stderr

@@ -21,7 +21,7 @@ from models.sensing import Measurement
 from models.simulation import prepare
 from stillhook.runs import headline_of, keep_worst
 from stillhook.runs.runs import EXTREMES
-from stillhook.runs.table import rows_of, tables_of
+from stillhook.runs.table import Estimate, QuantityRow, rows_of, tables_of
 
 THESIS = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 
@@ -400,6 +400,19 @@ def test_a_file_in_the_way_is_one_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(sh.InputError, match="the output folder cannot be made: a file is there"):
         sh.write_runs(tmp_path / "file", [three()], figures=False)
+
+
+def test_a_snap_on_a_rope_too_short_for_more_masses_leaves_the_run() -> None:
+    short = load_case("thesis-1975-rope").replace({"rope.length": 1.0})
+    (run,) = sh.simulate(short, "none", duration=5.0)
+    assert run.statistics.value("snap load") > 0.0
+    assert "snap load on more masses" not in run.statistics.quantities
+
+
+def test_an_interval_without_an_upper_end_says_at_least() -> None:
+    figures = (Estimate(0.0, 0.0, math.inf), Estimate(20.0, 3.0, 724.0))
+    row = QuantityRow("payload", "fall time", "time to loss of lock", "s", figures)
+    assert [row.interval(0), row.interval(1)] == ["at least 0", "3.00 to 724"]
 
 
 def test_a_snap_load_is_told_on_more_masses_too() -> None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
+from designs import thesis_design
 
+import stillhook as sh
 from models.basics import InputError
 from stillhook.cli import main
 from stillhook.text import OutputFolder
@@ -111,6 +114,31 @@ def test_a_run_that_was_killed_knows_its_files_again(tmp_path):
     folder.at("half.csv").write_text("written by another, and never counted")
     folder.at("runs/one.csv").touch()
     (tmp_path / "out" / ".case.yaml.123.tmp").touch()
+    check_own(tmp_path / "out")
+
+
+def test_a_folder_that_is_removed_in_mid_run_is_made_again(tmp_path, capsys, monkeypatch):
+    def evaluated(*words):
+        shutil.rmtree(tmp_path / "out")
+        return thesis_design()
+
+    monkeypatch.setattr("synth.evaluate_gains", evaluated)
+    words = ["evaluate", "thesis-1975", "--out", str(tmp_path / "out" / "it")]
+    assert main([*words, "--no-figures", "--no-bound"]) == 1  # the thesis's gains break a limit
+    assert capsys.readouterr().err == ""
+    assert sh.load_design(tmp_path / "out" / "it" / "design.yaml").parameters["a"] == 50.0
+    check_own(tmp_path / "out" / "it")
+
+
+def test_two_writers_of_one_folder_leave_whole_files_of_either(tmp_path):
+    one, other = (OutputFolder.prepare(tmp_path / "out") for _ in range(2))
+    for number in range(20):
+        one.write(f"{number}.txt", "1" * 10_000)
+        other.write(f"{number}.txt", "2" * 20_000)
+        one.write("both.txt", "1" * 10_000)
+    assert (tmp_path / "out" / "7.txt").read_text() == "2" * 20_000
+    assert (tmp_path / "out" / "both.txt").read_text() == "1" * 10_000
+    assert len((tmp_path / "out" / LIST).read_text().splitlines()) == 21
     check_own(tmp_path / "out")
 
 

@@ -256,6 +256,18 @@ def test_the_design_itself_where_nothing_better_was_found(monkeypatch: pytest.Mo
     case = bound_for(load_case("subsea-crane"))
     assert case.found == "no controller keeps the limits"
     assert "none found within M_s 2: no controller keeps the limits" in str(case)
+    blind = replace(case, free=replace(case.free, value=0.0))
+    assert blind.sentences[0].startswith("nothing is known of the best")
+
+
+@pytest.mark.ci
+@pytest.mark.filterwarnings("ignore::models.PhysicsWarning")
+def test_a_sea_in_which_nothing_keeps_the_drives_limits_has_no_bound() -> None:
+    # The dual grows without end, and the true loop of its last controller loses the load: 8.6 km
+    # came of that for a bound.
+    best = bound_for(load_case("subsea-crane").replace({"sea.significant_height": 20.0}))
+    assert best.free.value == math.inf
+    assert best.sentences == ("no linear controller keeps the limits",)
 
 
 @pytest.mark.slow

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cvxpy
 import numpy as np
 import pytest
 from bound_check import weighted_rms
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.basics import FloatArray, InputError, SynthesisError, White
+from models.basics import FloatArray, InputError, SolverError, SynthesisError, White
 from models.plant import LinearPlant
 from models.sea import SeaSpectrum
 from synth.bound import Bound
@@ -137,6 +138,17 @@ def test_it_holds_on_another_plant_that_it_is_told_of(bound: Bound) -> None:
     assert sensitivity(off, wise.controller).max() <= 1.6 * 1.001
     assert closed_loop_poles(off.without_delays(6), wise.controller).real.max() < 0.0
     assert wise.value > blind.value
+
+
+def test_a_programme_without_an_answer_says_nothing_of_how_to_call_the_solver(
+    bound: Bound, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*words: object, **more: object) -> None:
+        raise cvxpy.error.SolverError("Try another solver, or solve with verbose=True")
+
+    monkeypatch.setattr(cvxpy.Problem, "solve", fails)
+    with pytest.raises(SolverError, match=r"^Youla: Clarabel found no answer, for want of digits$"):
+        youla_design(bound, max_sensitivity=2.0, functions=1)
 
 
 def test_what_cannot_be_kept_is_told(bound: Bound) -> None:

@@ -207,6 +207,8 @@ def test_margins_of_a_plant_bound_the_gain_at_which_it_goes_unstable() -> None:
 
 def test_margins_print_as_a_tree() -> None:
     assert "M_s" in str(margins_of([4.0], [1.0, 3.0, 3.0, 1.0]))
+    assert "├ gain x 0 to x 2\n" in str(margins_of([4.0], [1.0, 3.0, 3.0, 1.0]))
+    assert "├ gain x 0 to without bound\n" in str(margins_of([0.5], [1.0, 1.0]))
 
 
 def test_three_nodes_all_but_on_a_line_bend_no_parabola():
