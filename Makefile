@@ -22,7 +22,7 @@ STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline headline_page landing
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo bem waves cluster zarr test test-ci test-all lint bench docs studies holds clean
+.PHONY: help demo bem waves cluster zarr test test-ci test-all pythons lint bench docs studies holds clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F'\t' '{printf "make %-9s %s\n", $$1, $$2}'
@@ -46,6 +46,21 @@ test-ci: $(VENV)/.installed-dev  ## notebooks, pages, whole studies: what CI run
 
 test-all: $(VENV)/.installed-dev  ## all tests
 	$(PY) -m pytest -m "slow or not slow" $(PYTEST_ARGS)
+
+# A Python is left out where its packages cannot be had; `.venv-3.X` stays.
+pythons: $(VENV)/.installed-dev  ## the same numbers on every later Python that is found
+	@for version in 3.12 3.13 3.14; do \
+	    for python in python$$version $${PYENV_ROOT:-$$HOME/.pyenv}/versions/$$version.*/bin/python; do \
+	        if "$$python" -c 'import ensurepip, venv' 2>/dev/null; then \
+	            echo "Python $$version: $$python"; \
+	            "$$python" -m venv $(VENV)-$$version && $(VENV)-$$version/bin/python -m pip install \
+	                --quiet --disable-pip-version-check -c constraints.txt -e . \
+	                || rm -rf $(VENV)-$$version; \
+	            break; \
+	        fi; \
+	    done; \
+	done
+	$(PY) -m pytest -m ci -k another_python tests/stillhook/commands/test_same_numbers.py
 
 lint: $(VENV)/.installed-dev  ## ruff, mypy --strict and the import contract
 	$(PY) -m ruff check .

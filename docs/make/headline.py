@@ -136,7 +136,12 @@ def redesign(key: Row, guesses: Sequence[Mapping[str, float]] = ()) -> sh.Design
     """Return the design of one row; `guesses` as `optimise_gains` takes them."""
     structure = ROLLOFF if key["kind"] == "rolloff" else GAINS
     # Seed 0 ends in a poorer basin of the spring with 50 ms (144.5 mm); 1 to 4 find the one stored.
-    return sh.optimise_gains(case_for(key), structure, guesses=guesses, seed=1)
+    # Of a roll-off on 2000 m three of four seeds end in one that is poorer by a twentieth.
+    seeds = (1, 2) if key["kind"] == "rolloff" else (1,)
+    found = [
+        sh.optimise_gains(case_for(key), structure, guesses=guesses, seed=seed) for seed in seeds
+    ]
+    return min(found, key=lambda design: (not design.ok, design.payload_rms))
 
 
 def scaled(gains: Mapping[str, float], factor: float) -> dict[str, float]:

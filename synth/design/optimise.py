@@ -57,6 +57,8 @@ _ROUGHEST = 0.99  # of the largest sea that any structure can do
 _SHARE = 2  # of the starts that each of several structures has
 ROUNDS = 6  # of asking an answer for what the rope asks of it
 _RESUMED = 3  # ends of a search that the next one, on more masses, begins from
+_LEAKS = 0.98  # of an answer's cost, below which an unstable end is worth more masses ...
+_FINER = 4  # ... so many times as many
 _HAIR = 1e-4  # relative excess over a limit in the largest sea
 _ALIKE = 1e-3  # relative difference of two seas that are as large
 _NO_DESIGN = "no ok design"  # for the least damping of the rope
@@ -239,8 +241,38 @@ def _on_the_rope(
         elif (told := _fitted(posed, tuning)) is posed:
             break
         posed, tuning = told, _again(told.problem, tuning, starts, seed, progress)
+    if tuning.ok:
+        posed, tuning = _where_it_is_stable(given, posed, tuning, seed, progress)
     if damped and not tuning.ok:
         tuning = replace(tuning, status=_damped_too_little(posed, tuning))
+    return posed, tuning
+
+
+def _where_it_is_stable(
+    given: PosedFamily,
+    posed: PosedFamily,
+    tuning: Tuning,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[PosedFamily, Tuning]:
+    """Return a better answer that the masses of a search have held to be unstable, if there is one.
+
+    A rope of few masses has its modes too low, and where they are hardly damped that may cost a
+    loop its stability: descents then lead to where it is unstable, and far lower.
+    """
+    leaks = sorted((s for s in tuning.found.starts if not s.stable), key=lambda s: s.told)
+    for leak in leaks[:1]:
+        if posed.masses >= MAX_MASSES or not leak.told < _LEAKS * tuning.cost:
+            break
+        finer = given.on(min(_FINER * posed.masses, MAX_MASSES))
+        if not finer.problem.stable(leak.end):
+            break
+        found = search(finer.problem, 1, seed, [leak.end], progress, only_guesses=True)
+        other = tuning_of(finer.problem, found)
+        if other.ok and other.cost < tuning.cost:
+            again = replace(other, starts=tuning.starts, agreed=tuning.agreed)
+            # No leak leads on from here: the search began at one point alone.
+            return _on_the_rope(given, finer, again, 1, seed, progress)
     return posed, tuning
 
 

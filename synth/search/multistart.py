@@ -50,7 +50,9 @@ _BEST_STARTS = 6  # of the search for the best of one member alone
 class Start:
     """One start of the search: where it began, where it ended, and how.
 
-    `cost` is on the moderate nodes of the first pass, where a margin may leak between nodes.
+    `cost` is on the moderate nodes of the first pass, where a margin may leak between nodes; it is
+    without end of a start that did not arrive, or arrived at a loop that is unstable.  `told` is
+    what the nodes say of any.
     """
 
     begin: FloatArray
@@ -60,6 +62,7 @@ class Start:
     stable: bool
     message: str
     iterations: int
+    told: float = np.inf
 
     @classmethod
     def of(cls, begin: FloatArray, solved: Solution, *, stable: bool) -> Start:
@@ -72,6 +75,7 @@ class Start:
             stable=stable,
             message=solved.message,
             iterations=solved.iterations,
+            told=float(np.exp(solved.objective)),
         )
 
 
@@ -246,6 +250,8 @@ def _come_by(
         # Along a flat valley a descent takes long; it is worth its while where it may be the best.
         if coarse.message != UNFINISHED or coarse.objective > best + _BEHIND:
             break
+        if not family.stable(coarse.values, coarse.coefficients):
+            break  # a resonance has become unstable between the nodes
         coarse = rough(coarse.values, coarse.coefficients, exact=exact)
     if coarse.converged and coarse.objective < best:
         # The best so far by nodes for the loop where it began, or a margin that leaks, maybe.

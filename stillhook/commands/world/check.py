@@ -137,6 +137,7 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
     masses += [f"rope {quantity(rope.mass, 'kg')}"]
     if case.rigging.block_mass:
         masses += [f"hook block {quantity(case.rigging.block_mass, 'kg')}"]
+    moves = f"{number(rms / hook.displacement.rms)} times the hook's, with the drum held"
     how = "fixed by the case" if payload.fixed_drag is not None else "with the drum held"
     return [
         ("stiffness K = EA/L", quantity(rope.stiffness, "N/m"), f"EA {quantity(rope.ea, 'N')}{of}"),
@@ -149,11 +150,9 @@ def _rope(case: Case, hook: HookMotion) -> Rows:
             f"axial waves need {quantity(rope.travel_time, 's')} end to end",
         ),
         ("linear drag", quantity(drag, "N s/m"), how),
-        (
-            "payload, rms",
-            quantity(rms, "m"),
-            f"{number(rms / hook.displacement.rms)} times the hook's, with the drum held",
-        ),
+        ("payload, rms", quantity(rms, "m"), moves)
+        if math.isfinite(rms)
+        else ("payload, rms", "-", "without bound with the drum held: nothing damps it"),
     ]
 
 

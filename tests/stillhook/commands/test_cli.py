@@ -262,6 +262,12 @@ def test_check_shows_what_follows_from_a_case(run):
     assert max(map(len, ending.out.splitlines())) <= 80
 
 
+def test_check_says_that_nothing_damps_a_load_in_words(run):
+    ending = run("check", "thesis-1975", "--set", "payload.drag.coefficient=0")
+    assert "nothing damps" in ending.out
+    assert " inf " not in ending.out
+
+
 def test_check_warns_once_about_each_thing(run):
     ending = run("check", "thesis-1975", "--set", "sea.significant_height=12")
     assert ending.status == 0

@@ -19,17 +19,27 @@ COMMANDS = {
     "compare thesis-1975 --controllers none,feed-forward --seeds 2 --duration '15 s'": "runs.csv",
 }
 
+#: Those that `make pythons` has set up.
+OTHERS = sorted(Path(__file__).parents[3].glob(".venv-3.*/bin/python"))
 #: What a clock has measured.
 CLOCKS = {"wall", "step median", "step p99", "step max"}
 
 
-def rows(line: str, how: str, folder: Path, **environment: str) -> list[dict[str, str]]:
-    """Run a command, and return the rows of its table without what a clock has measured."""
+def rows(
+    line: str, how: str, folder: Path, python: Path | None = None, **environment: str
+) -> list[dict[str, str]]:
+    """Run a command, and return the rows of its table without what a clock has measured.
+
+    By default in this Python; another has its own packages.
+    """
+    if python is None:
+        environment["PYTHONPATH"] = os.pathsep.join(sys.path)
+    folder.mkdir(exist_ok=True)
     words = [*shlex.split(f"{line} {how}"), "--no-figures", "--quiet", "--out", "out"]
     done = subprocess.run(
-        [sys.executable, "-m", "stillhook", *words],
+        [python or sys.executable, "-m", "stillhook", *words],
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)} | environment,
+        env=os.environ | environment,
         capture_output=True,
         text=True,
         timeout=600,
@@ -60,6 +70,14 @@ def test_two_processes_give_the_same(alone, line, tmp_path):
 @pytest.mark.parametrize("line", COMMANDS)
 def test_without_a_compiler_the_numbers_are_the_same(alone, line, tmp_path):
     assert rows(line, "--jobs 2", tmp_path, STILLHOOK_COMPILE="0") == alone[line]
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_another_python_gives_the_same(alone, line, tmp_path):
+    if not OTHERS:
+        pytest.skip("no other Python is set up: make pythons")
+    for python in OTHERS:
+        assert rows(line, "--jobs 1", tmp_path / python.parts[-3], python) == alone[line], python
 
 
 @pytest.mark.slow  # a cluster takes its time to start
