@@ -55,6 +55,7 @@ HEARS_NO_PAYLOAD = ("feed-forward", "constant-tension")
 # White noise sampled at 4 Hz has the density s^2/(2 Hz) up to 2 Hz: pi/(2 sqrt 2) times the
 # corner is the bandwidth of a Butterworth low-pass of second order, so 11.31 rad/s is 2 Hz.
 MRU = {"noise_floor": 0.0, "noise_fraction": 0.01, "noise_bandwidth": 11.31}
+CELL = {"bandwidth": 1e4}  # exact, and as good as at once [rad/s]
 LIMITS = {
     "limits.drive": "report",
     "limits.max_sensitivity": 2.0,
@@ -125,6 +126,7 @@ def questions(structures: Sequence[str], ropes: Sequence[str]) -> list[Row]:
 def case_of(row: Row) -> Case:
     """Return the case of a row."""
     changes = {**LIMITS, "sensors.telemetry.delay": row.delay, "sensors.mru": MRU}
+    changes |= {"sensors.load_cell": CELL}
     if row.length is None:
         return load_case("thesis-1975").replace(changes)
     return load_case("thesis-1975-rope").replace({**changes, "rope.length": row.length})
