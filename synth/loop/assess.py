@@ -43,6 +43,7 @@ from .pole_region import PoleRegion, with_delay_models
 from .responses import Closing, LoopBlocks, LoopResponses, blocks_with, with_loops
 
 _RTOL = 1e-8  # of every variance
+_CANCELLED = 1e-5  # ... where rounding leaves no more digits
 _GRID_PER_DECADE = 150
 _LOW = 0.3  # of the largest value on the grid, below which no peak between its points is looked for
 _SETTLED = 1e-3  # ... and for which adapted nodes do
@@ -326,15 +327,20 @@ class Assessment:
         if self._nodes is not None:
             return self._nodes(self.poles)
         low, high, half_line = integration_band(self.disturbances, self.poles)
-        return adaptive_nodes(
+        adapted = partial(
+            adaptive_nodes,
             lambda omega: np.concatenate(self._spectra(outputs, omega)),
             low,
             high,
             splits=[w for d in self.disturbances for w in d.splits],
             poles=_off_axis(self.poles),
-            rtol=rtol,
             half_line=half_line,
         )
+        try:
+            return adapted(rtol=rtol)
+        except SolverError:
+            # Of a motion that is cancelled to a thousandth the rest has fewer digits.
+            return adapted(rtol=max(rtol, _CANCELLED))
 
     def _moment(self, output: str) -> tuple[float, float]:
         if output not in self._moments and not self._moments and self._bounded:

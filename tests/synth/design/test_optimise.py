@@ -290,3 +290,38 @@ def test_an_answer_that_few_rope_masses_hold_to_be_unstable_is_found(seed: int) 
     assert design.ok
     # 595 mm are the best that four masses know of.
     assert design.payload_rms == pytest.approx(0.1844, rel=1e-3)
+
+
+def test_a_motion_that_is_cancelled_to_a_thousandth_has_an_rms() -> None:
+    """Rounding leaves its spectrum some six digits, and the integral no more."""
+    case = models.load_case("thesis-1975-rope").replace(
+        {
+            "rope.length": 2000.0,
+            "limits.drive": "report",
+            "sensors.telemetry.delay": 0.05,
+            "sensors.mru": {
+                "noise_floor": 0.0,
+                "noise_fraction": 0.01,
+                "noise_bandwidth": 11.31,
+            },
+        }
+    )
+    gains = {
+        "payload.acceleration_gain": 1.64516121,
+        "payload.velocity_gain": 0.862991426,
+        "payload.position_gain": -0.00142242721,
+        "drum.speed_gain": 32.4698655,
+        "drum.position_gain": 0.00189686909,
+        "heave.gain": 0.999643919,
+        "heave.lead": 0.0499791136,
+        "heave.bandwidth": 100.0,
+        "rolloff.corner": 6.13639685,
+        "rolloff.damping": 0.757891556,
+    }
+    design = evaluate_gains(case, gains, "combined")
+    assert design.payload_rms == pytest.approx(1.9103e-3, rel=1e-3)
+    assert design.verification is not None
+    assert "payload_rms" not in design.verification.failed
+    assert design.switched.deviation("payload.displacement") == pytest.approx(
+        design.payload_rms, rel=0.02
+    )
