@@ -193,8 +193,15 @@ def test_what_a_row_keeps_is_kept_again(row):
     # What is printed is the mean square over the signs of a reference unit's errors.
     seeds = holds.seeds_of(question(int(row["question"])), case, row["structure"])[:4]
     length = 2.0 * SHORT / (1 + len(seeds))
+    given = case.payload.fixed_drag
+    drag = {} if given is None else {"payload.linear_drag": given, "payload.quadratic_drag": 0.0}
     runs = sh.simulate(
-        case, design, seeds=seeds, duration=holds.SETTLE + length, settle=holds.SETTLE
+        case,
+        design,
+        seeds=seeds,
+        duration=holds.SETTLE + length,
+        settle=holds.SETTLE,
+        parameters=drag,
     )
     told = [run.statistics for run in runs]
     kept = {name for name, (off, may) in page.deviations(row).items() if abs(off) <= may}

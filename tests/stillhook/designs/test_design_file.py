@@ -62,6 +62,7 @@ def start(cost: float) -> Start:
         "stable": True,
         "message": "Solve_Succeeded: 100 %",
         "iterations": 17,
+        "told": cost,
     }
     names = [field.name for field in dataclasses.fields(Start)]
     return Start(**{name: values[name] for name in names})
