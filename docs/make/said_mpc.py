@@ -396,7 +396,8 @@ SAYINGS = [
         name="forecasts",
         template="""| `predictor=` | what it knows | three seconds ahead it errs by |
 | --- | --- | --- |
-| `"bank"` | the spectrum and a hundred others, all sensors, the errors made | {bank3:.0f} % of the hook's rms |
+| `"bank"` | the spectrum and a hundred others, all sensors, the errors made | \
+{bank3:.0f} % of the hook's rms |
 | `"kalman"` | the sea's spectrum, all sensors | {kalman3:.0f} % |
 | `"ar"` | the record so far, nothing else | {ar3:.0f} % |""",
         work=forecasts,
@@ -405,8 +406,8 @@ SAYINGS = [
         page=PAGE,
         name="farther",
         template="""
-            At 5 s it is {bank5:.0f}, {kalman5:.0f} and {ar5:.0f} %, at 8 s {bank8:.0f}, {kalman8:.0f} and
-            {ar8:.0f} %:
+            At 5 s it is {bank5:.0f}, {kalman5:.0f} and {ar5:.0f} %, at 8 s {bank8:.0f},
+            {kalman8:.0f} and {ar8:.0f} %:
         """,
         work=forecasts,
     ),
