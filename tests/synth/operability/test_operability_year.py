@@ -316,7 +316,7 @@ def test_the_command_writes_tables_and_figures(
     site, out = tmp_path / "site.csv", tmp_path / "out"
     write_scatter(site, example_scatter())
     words = ["operability", "thesis-1975", "--tp", "6..12/3", "--payload-rms", "5 cm"]
-    assert main([*words, "--scatter", str(site), "--out", str(out)]) == 0
+    assert main([*words, "--scatter", str(site), "--rules", "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "is beyond the limit" in said
     assert "3 points of the contour by single evaluations" in said
