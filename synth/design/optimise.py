@@ -260,20 +260,20 @@ def _where_it_is_stable(
     A rope of few masses has its modes too low, and where they are hardly damped that may cost a
     loop its stability: descents then lead to where it is unstable, and far lower.
     """
-    leaks = sorted((s for s in tuning.found.starts if not s.stable), key=lambda s: s.told)
-    for leak in leaks[:1]:
-        if posed.masses >= MAX_MASSES or not leak.told < _LEAKS * tuning.cost:
-            break
-        finer = given.on(min(_FINER * posed.masses, MAX_MASSES))
-        if not finer.problem.stable(leak.end):
-            break
-        found = search(finer.problem, 1, seed, [leak.end], progress, only_guesses=True)
-        other = tuning_of(finer.problem, found)
-        if other.ok and other.cost < tuning.cost:
-            again = replace(other, starts=tuning.starts, agreed=tuning.agreed)
-            # No leak leads on from here: the search began at one point alone.
-            return _on_the_rope(given, finer, again, 1, seed, progress)
-    return posed, tuning
+    unstable = [start for start in tuning.found.starts if not start.stable]
+    leak = min(unstable, key=lambda start: start.told, default=None)
+    if leak is None or posed.masses >= MAX_MASSES or not leak.told < _LEAKS * tuning.cost:
+        return posed, tuning
+    finer = given.on(min(_FINER * posed.masses, MAX_MASSES))
+    if not finer.problem.stable(leak.end):
+        return posed, tuning
+    found = search(finer.problem, 1, seed, [leak.end], progress, only_guesses=True)
+    other = tuning_of(finer.problem, found)
+    if not (other.ok and other.cost < tuning.cost):
+        return posed, tuning
+    again = replace(other, starts=tuning.starts, agreed=tuning.agreed)
+    # No leak leads on from here: the search began at one point alone.
+    return _on_the_rope(given, finer, again, 1, seed, progress)
 
 
 def seen_at(
