@@ -322,8 +322,13 @@ class Assessment:
         names = [d.name for d in self.disturbances]
         return responses[names.index(disturbance)], np.sum(np.abs(responses) ** 2 * shaken, axis=0)
 
-    def quadrature(self, outputs: Sequence[str], rtol: float = _RTOL) -> Quadrature:
-        """Return nodes on which the variance and the second moment of `outputs` are accurate."""
+    def quadrature(
+        self, outputs: Sequence[str], rtol: float = _RTOL, *, strict: bool = False
+    ) -> Quadrature:
+        """Return nodes on which the variance and the second moment of `outputs` are accurate.
+
+        Raises SolverError if rounding leaves too few digits for that; if `strict`, for `rtol`.
+        """
         if self._nodes is not None:
             return self._nodes(self.poles)
         low, high, half_line = integration_band(self.disturbances, self.poles)
@@ -339,6 +344,8 @@ class Assessment:
         try:
             return adapted(rtol=rtol)
         except SolverError:
+            if strict:
+                raise
             # Of a motion that is cancelled to a thousandth the rest has fewer digits.
             return adapted(rtol=max(rtol, _CANCELLED))
 
@@ -384,7 +391,8 @@ class Assessment:
         """Return the nodes of some outputs, the same for every combination of signs."""
         key = tuple(outputs)
         if key not in self._kept:
-            self._kept[key] = self.quadrature(outputs)
+            # Among several, one that is cancelled costs the others no digits.
+            self._kept[key] = self.quadrature(outputs, strict=len(key) > 1)
         return self._kept[key]
 
     @cached_property
