@@ -168,7 +168,7 @@ DESIGN = options(
     """
     --design FILE  a design that was written, as in out/CASE/design.yaml
     --gains A=..,a=..,a1=..,a2=..  or gains, or parameters by name (default: the gains that the
-        case has in use; else the best design is found, half a minute once)
+        case has in use; else the best design is found, a minute or so once)
     --structure NAME  whose parameters these are (default: payload-feedback); without --gains its
         best ones are found
     """

@@ -20,6 +20,8 @@ from .tuning import Tuning
 
 _BINDING = 5e-3  # a limit that is used up to this share of itself binds
 _KEPT = 1e-4  # relative excess over a limit that a polished answer may have
+_ALIKE = 1e-3  # of the logarithm that is looked for, within which two answers agree
+_HOPELESS = 3  # points that lead nowhere, after which no other is tried
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,10 +110,15 @@ def _arrived(
 ) -> list[Solution]:
     """Return from each point the answer of the first try that leads to a stable one.
 
-    A try is coefficients and extra.
+    A try is coefficients and extra.  No further point is tried once the best two agree, nor after
+    some that lead nowhere.
     """
-    found, reference = [], briskest(problem, begins)
-    for begin in begins:
+    found: list[Solution] = []
+    reference = briskest(problem, begins)
+    for k, begin in enumerate(begins):
+        best = sorted(solved.objective for solved in found)[:2]
+        if (len(best) == 2 and best[1] - best[0] < _ALIKE) or (k == _HOPELESS and not found):
+            break
         for coefficients, extra in tries:
             solved = settle(
                 problem,
@@ -132,7 +139,8 @@ def _required(
     problem: FamilyProblem, free: Tuning, best: Solution, binding: Sequence[str]
 ) -> dict[str, float]:
     """Return the least bounds of the binding limits for which the sea asked for is feasible."""
-    begins = [*_begins(free), best.values]
+    first, *others = _begins(free)
+    begins = [first, best.values, *others]
     # From the limits as they are to twenty times those.
     tries = [(_coefficients(free), room) for room in (0.0, 1.0, 3.0)]
     # Where a limit bends that does not bind at the largest sea, all of the drive's may give way.

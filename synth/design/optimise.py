@@ -159,8 +159,10 @@ def _simplest(designs: Sequence[Design]) -> Design:
     """Return the simplest design within five percent of the stillest; see `optimise_gains`."""
     ok = [design for design in designs if design.ok]
     if not ok:
-        roughest = max(design.significant_height for design in designs)
-        there = [d for d in designs if d.significant_height >= _ROUGHEST * roughest]
+        # What breaks limits whatever the drive is no answer to how much the drive can do.
+        short = [design for design in designs if not design.feasible] or designs
+        roughest = max(design.significant_height for design in short)
+        there = [d for d in short if d.significant_height >= _ROUGHEST * roughest]
         return min(there, key=lambda design: design.family_rms)
     stillest = min(design.family_rms for design in ok)
     return next(design for design in ok if design.family_rms <= _AS_STILL * stillest)

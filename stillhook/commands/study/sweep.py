@@ -55,7 +55,7 @@ ARGUMENTS = (
         who is tried:
         --design FILE  a design that was written, as in out/CASE/design.yaml
         | --gains A=..,a=..,a1=..,a2=..  gains, or parameters by name (default: the gains that the
-            case has in use; else the best design is found, half a minute once)
+            case has in use; else the best design is found, a minute or so once)
         | --controller NAME  another controller, with --mode time, as in mpc (see `stillhook
             scenarios`)
         --structure NAME  whose parameters --gains are (default: payload-feedback); without them

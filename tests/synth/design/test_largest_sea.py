@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from designs import PERFECT_MRU
 from scipy.optimize import minimize
 
 from models import load_case
 from models.basics import SolverError
-from synth import optimise_gains
+from synth import evaluate_gains, optimise_gains
+from synth.design import optimise
 from synth.question import pose
+
+
+def test_limits_that_are_broken_whatever_the_drive_hide_no_largest_sea(monkeypatch):
+    """In 20 m the crane was told to have no gains at all, where four structures work up to 5 m."""
+    case = load_case("thesis-1975").replace(PERFECT_MRU)
+    gains = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
+    found = replace(evaluate_gains(case, gains), ok=False)
+    height = found.significant_height
+    small = {"payload-feedback": 1.0, "feed-forward": 0.3, "drum-feedback": 0.5}
+
+    def answer(posed, *_):
+        name = posed.first.structure.name
+        return replace(found, structure=name, significant_height=small[name] * height)
+
+    monkeypatch.setattr(optimise, "_optimised", answer)
+    assert optimise_gains(case, list(small)).structure == "drum-feedback"
+    assert optimise_gains(case, ["payload-feedback"]).structure == "payload-feedback"
 
 
 @pytest.mark.slow
