@@ -23,6 +23,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from ..basics import (
+    BoolArray,
     ComplexArray,
     FloatArray,
     InputError,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     import control
 
 _OWNER = "linear plant"
+_ROUNDING = 8.0 * float(np.finfo(float).eps)  # of a sum, relative to its parts
 _HAIR = 1e-8  # relative distance at which 1/(s - pole) leaves a closed loop eight digits
 
 
@@ -236,12 +238,33 @@ class LinearPlant(ReadOnlyArrays):
 
     @cached_property
     def _transfer(self) -> tuple[Transfer, FloatArray, list[int]]:
-        """C (s I - A)^-1 B and D of all signals, (ny + nz, nu + nw + rates), and nw's indices."""
+        """C (s I - A)^-1 B and D of all signals, (ny + nz, nu + nw + rates), and nw's indices.
+
+        What is the time derivative of another signal is s times that.  An acceleration is the sum
+        of forces that next to cancel at low frequency: at a hundred-thousandth of a rope's first
+        mode half a per cent of it would be rounding.
+        """
         keep = pick(_OWNER, "disturbance", self.disturbances, self.independent_disturbances)
         columns = [*keep, *pick(_OWNER, "disturbance", self.disturbances, list(self.rates))]
         C, B = np.vstack([self.C, self.Cz]), np.hstack([self.B, self.E[:, columns]])
         direct = np.block([[self.D, self.F[:, columns]], [self.Dz, self.Fz[:, columns]]])
-        return self.resolvent.between(C, B), direct, keep
+        slopes = _slopes(self.A, B, C, direct)
+        for i, (_, at_once) in slopes.items():
+            direct[i, at_once] = 0.0
+        plain = [i for i in range(len(C)) if i not in slopes]
+        of_plain = self.resolvent.between(C[plain], B)
+
+        def transfer(s: ComplexArray) -> ComplexArray | None:
+            part = of_plain(s)
+            if part is None or not slopes:
+                return part
+            rows = np.empty((s.size, *direct.shape), dtype=np.complex128)
+            rows[:, plain] = part
+            for i, (j, _) in slopes.items():
+                rows[:, i] = s[:, None] * rows[:, j]
+            return rows
+
+        return transfer, direct, keep
 
     def _with(self, **changes: Any) -> LinearPlant:
         """Return it with changes that need no check: they follow from what has been checked."""
@@ -542,6 +565,33 @@ def _matrix(name: str, value: npt.ArrayLike) -> FloatArray:
 def _delay_states(names: Sequence[str], delays: Sequence[float], order: int) -> list[str]:
     late = [name for name, delay in zip(names, delays, strict=True) if delay > 0.0]
     return [f"{name}.delay{i + 1}" for name in late for i in range(order)]
+
+
+def _slopes(
+    A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray
+) -> dict[int, tuple[int, BoolArray]]:
+    """Return which signals are the time derivative of which other one, that one before it.
+
+    So is row i of C of row j where C_i = C_j A and what C_j B brings at once is in its direct term:
+    C_j A (s I - A)^-1 B + C_j B = s C_j (s I - A)^-1 B.  With it goes in which columns that is.
+    """
+    step = _ROUNDING * (np.abs(C) @ np.abs(A))
+    least = _ROUNDING * (np.abs(C) @ np.abs(B))
+    moved, through = C @ A, C @ B
+    at_once = np.abs(through) > least
+    # [i, j]: whether i is the derivative of j.
+    same = (np.abs(C[:, None] - moved) <= step).all(axis=2)
+    same &= ((np.abs(direct[:, None] - through) <= least) | ~at_once).all(axis=2)
+    same &= (np.abs(C).sum(axis=1) > 0.0)[:, None] & ~np.eye(len(C), dtype=np.bool_)
+    found: dict[int, tuple[int, BoolArray]] = {}
+    known = np.flatnonzero(np.logical_not(same.any(axis=1))).tolist()
+    for j in known:  # grows, as a derivative may have one, too; what goes in circles is in none
+        for i in np.flatnonzero(same[:, j]).tolist():
+            if i not in found:
+                found[i] = j, at_once[j]
+                if not at_once[j].any():
+                    known.append(i)
+    return found
 
 
 def _integrates(A: FloatArray) -> bool:

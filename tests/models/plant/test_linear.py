@@ -92,6 +92,67 @@ def test_response_of_many_points_is_that_of_each() -> None:
         np.testing.assert_allclose(many.zw[i], one.zw[0], rtol=1e-12)
 
 
+def test_what_is_a_derivative_has_the_digits_of_what_it_is_one_of() -> None:
+    """Two masses and two springs behind a drum: forces next to cancel in slow motion.
+
+    Row by row against displacements, whose responses lose nothing, and noise that is in one
+    measurement alone.
+    """
+    k, m, c = 1e6, np.array([3.0, 50e3]), 10.0
+    A = np.zeros((5, 5))
+    A[[0, 1], [2, 3]] = 1.0
+    A[2] = np.array([-2.0 * k, k, -c, 0.0, k]) / m[0]
+    A[3] = np.array([k, -k, 0.0, -c, 0.0]) / m[1]
+    shaken = np.array([[0.0], [0.0], [0.0], [1.0 / m[1]], [0.0]])
+    plant = LinearPlant(
+        A=A,
+        B=np.eye(5)[:, [4]],
+        E=np.hstack([shaken, np.zeros((5, 1))]),
+        C=np.array([A[3], np.eye(5)[3], np.eye(5)[1]]),
+        D=np.zeros((3, 1)),
+        F=[[1.0 / m[1], 0.0], [0.0, 1.0], [0.0, 0.0]],
+        disturbances=["force", "noise of the velocity"],
+    )
+    s = 1j * np.geomspace(1e-7, 1e3, 31)
+    acceleration, velocity, displacement = plant.response_at(s).yu[:, :, 0].T
+    assert velocity == pytest.approx(s * displacement, rel=1e-12, abs=0.0)
+    assert acceleration == pytest.approx(s * s * displacement, rel=1e-12, abs=0.0)
+    # By the stiffness of both springs in series with each mass, which cancels nothing.
+    near = m * s[:, None] ** 2 + c * s[:, None]
+    two = k / ((near[:, 0] + k) * (near[:, 1] + k) + k * near[:, 1]) * k / s
+    assert displacement == pytest.approx(two, rel=1e-9)
+    acceleration, velocity, displacement = plant.response_at(s).yw[:, :, 0].T
+    assert acceleration == pytest.approx(s * velocity, rel=1e-12, abs=0.0)
+    assert displacement == pytest.approx(
+        (near[:, 0] + 2.0 * k) / ((near[:, 0] + k) * (near[:, 1] + k) + k * near[:, 1]), rel=1e-9
+    )
+    assert np.array_equal(plant.response_at(s).yw[:, :, 1].T, [0.0 * s, 0.0 * s + 1.0, 0.0 * s])
+
+
+@given(st.integers(0, 2**32 - 1), st.booleans())
+def test_derivatives_of_any_plant_are_its_responses(seed: int, turning: bool) -> None:
+    """Against solving at each point; also where signals are derivatives of each other."""
+    rng = np.random.default_rng(seed)
+    A, B, E = rng.normal(size=(4, 4)), rng.normal(size=(4, 2)), rng.normal(size=(4, 2))
+    if turning:  # A squared is -I: every signal is minus the derivative of its derivative
+        A = np.kron(np.eye(2), [[0.0, 1.0], [-1.0, 0.0]])
+    row = rng.normal(size=(1, 4)).round(1)
+    C = np.vstack([row @ A @ A @ A, row @ A @ A, row @ A, row])
+    other = rng.normal(size=(1, 4))  # its derivative but for what comes at once
+    Cz = np.vstack([other @ A, other])
+    D = np.vstack([C[1:] @ B, rng.normal(size=(1, 2))])
+    F = np.vstack([C[1:] @ E, np.zeros((1, 2))])
+    F[0, 1] += 1.0
+    plant = LinearPlant(A=A, B=B, E=E, C=C, D=D, F=F, Cz=Cz)
+    points = np.array([0.3j, 2.0 + 1.0j, 7.0j])
+    found = plant.response_at(points)
+    for k, s in enumerate(points):
+        inside = np.linalg.inv(s * np.eye(4) - A)
+        assert found.yu[k] == pytest.approx(C @ inside @ B + D, rel=1e-7, abs=1e-7)
+        assert found.yw[k] == pytest.approx(C @ inside @ E + F, rel=1e-7, abs=1e-7)
+        assert found.zu[k] == pytest.approx(Cz @ inside @ B, rel=1e-7, abs=1e-7)
+
+
 def test_rates_are_folded_in_with_their_feedthrough() -> None:
     plain = random_plant()
     folded = random_plant(rates={"heave_rate": "heave"})
