@@ -207,8 +207,8 @@ class MruModel:
     def heard(self, read: Read, start: int, count: int) -> tuple[FloatArray, FloatArray]:
         """Return heave and heave rate with gain and phase error, (count,) each.
 
-        `read` gives heave [m] and heave rate [m/s] at so many samples from one on; what lies before
-        the run or after it is not known, and 0.
+        `read` gives heave [m] and heave rate [m/s] at so many samples from one on, also of before
+        the run and after it.
         """
         gain, phase = self.signs[0] * self._unit.gain_error, self.signs[1] * self._unit.phase_error
         if phase == 0.0:

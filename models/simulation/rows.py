@@ -69,13 +69,22 @@ class RowMaker:
         return rows, mru
 
     def _hook(self, start: int, count: int) -> tuple[FloatArray, FloatArray]:
-        """Return the hook's displacement and velocity at samples; 0 before and after the run."""
+        """Return the hook's displacement and velocity at samples.
+
+        Before and after the run it goes on as if turned about its ends: at zero it would jump, and
+        a unit that hears what is to come would show that.
+        """
         n, motion = self.substeps, self.motions[0]
-        found = np.zeros((2, count))
-        low, high = max(start, 0), min(start + count, (motion.rows - 1) // n + 1)
-        moved = motion.block(low * n, (high - low - 1) * n + 1)
-        found[:, low - start : high - start] = [values[::n] for values in moved[:2]]
-        return found[0], found[1]
+        last = (motion.rows - 1) // n
+        turn, place = np.divmod(np.arange(start, start + count), last)
+        odd = turn % 2 != 0
+        place = np.where(odd, last - place, place)
+        low, high = int(place.min()), int(place.max())
+        z, v = (values[::n] for values in motion.block(low * n, (high - low) * n + 1)[:2])
+        first, end = (float(motion.block(k * n, 1)[0][0]) for k in (0, last))
+        z = z[place - low]
+        further = np.where(odd, (turn + 1) * end - (turn - 1) * first, turn * (end - first))
+        return further + np.where(odd, -z, z), v[place - low]
 
     def trip(self, rows: FloatArray, first: int, since: float) -> None:
         """Write into rows of `block` that the brake closes at a time [s] and the command ends.

@@ -47,7 +47,7 @@ _GAMMAS = (1.0, 3.3)
 _SWELLS, _WINDS, _SHARES = (10.0, 11.5, 13.0, 14.7, 16.5), (5.0, 5.8, 6.7, 7.8), (0.3, 0.6, 0.85)
 _JUDGED, _EVERY = (1.0, 2.0, 4.0), 0.5  # leads, and from one judgement to the next [s]
 # [s], of the errors, and before which nothing is judged: the filter has begun by then.
-_MEMORY, _BEGIN = 90.0, 12.0
+_MEMORY, _BEGIN = 90.0, 20.0
 _INDEPENDENT = 1.0  # leads, after which an error is another
 _LONG = 60.0  # [s], over which somebody has to have been judged who came later
 _TOLD = 0.999  # share of the sea that is told before anything is known
@@ -142,6 +142,7 @@ class SeaBank:
         self._made = np.full((self._depth, members, len(_JUDGED)), np.nan)
         self._errors = np.zeros((members, len(_JUDGED)))
         self._judged = np.zeros((members, 1))  # seconds that the errors stand for
+        self._since = np.zeros((members, len(_JUDGED)))  # errors since the last was judged
         self.shares = np.exp(self._prior)
         self._blended = np.zeros(members)
         self.misfit = False
@@ -194,11 +195,22 @@ class SeaBank:
             known = np.isfinite(made)
             self._judged = np.minimum(self._judged + _EVERY * known[:, -1:], _MEMORY)
             share = _EVERY / np.maximum(self._judged, _EVERY)
-            self._errors += share * np.where(known, (made - heave) ** 2 - self._errors, 0.0)
+            square = (made - heave) ** 2
+            self._errors += share * np.where(known, square - self._errors, 0.0)
+            both = known & known[-1]
+            self._since += share[-1] * np.where(both, square - self._since, 0.0)
             if known[0, -1]:
-                count = float(self._judged[0, 0]) / (_INDEPENDENT * np.array(_JUDGED))
-                score = self._prior - 0.5 * np.log(np.maximum(self._errors, 1e-300)) @ count
-                score[self._judged[:, 0] < min(float(self._judged[0, 0]), _LONG)] = -np.inf
+                each = 1.0 / (_INDEPENDENT * np.array(_JUDGED))
+                score = self._prior + float(self._judged[0, 0]) * _likelihood(self._errors) @ each
+                # The autoregression came later: by how much it is better than the best since then,
+                # as it was spared the errors of a filter that had just begun.
+                if self._judged[-1, 0] < _LONG:
+                    score[-1] = -np.inf
+                else:
+                    best = int(score[:-1].argmax())
+                    better = _likelihood(self._since[-1]) - _likelihood(self._since[best])
+                    more = self._prior[-1] - self._prior[best]
+                    score[-1] = score[best] + more + float(self._judged[-1, 0]) * better @ each
                 shares = np.exp(score - score.max())
                 self.shares = shares / shares.sum()
                 self.misfit = bool(self.fit < (_FITS if self.misfit else _MISFIT))
@@ -227,6 +239,11 @@ class SeaBank:
             scale = float(np.mean(made / np.maximum(judged, 1e-9)))
         z, v = (np.interp(self.leads, self._knots, scale * spread[k::2]) for k in (0, 1))
         self._std = (np.sqrt(z), np.sqrt(v))
+
+
+def _likelihood(errors: FloatArray) -> FloatArray:
+    """Return the logarithm of how likely an error is with its mean square, but for a constant."""
+    return np.asarray(-0.5 * np.log(np.maximum(errors, 1e-300)))
 
 
 def _knots(steps: int, T: float) -> FloatArray:

@@ -79,7 +79,10 @@ class SampledFilter:
 
     The gain that is right for all signals together may let a filter run away that hears some of
     them only.  Each set of signals has a steady gain; where the set changes, the covariance is
-    carried from sample to sample with what is there, until it is the steady one.
+    carried from sample to sample with what is there, until it is the steady one.  While the gains
+    reckon with less noise than G, for the sake of what must not be told by what is left, so does
+    that covariance: what the estimate is off by is carried beside it, and taken up again with the
+    next other signal.
 
     Parameters
     ----------
@@ -122,10 +125,13 @@ class SampledFilter:
         self._start = self._P0
         self._first: list[FloatArray] = []
         self._added: dict[bytes, FloatArray] = {}
+        self._calmer: set[bytes] = set()  # sets whose gains reckon with less noise than there is
         self._steady: dict[bytes, tuple[FloatArray, FloatArray]] = {}
         for key, own in sets.items():
             there = np.frombuffer(key, np.bool_)
             self._added[key] = own @ own.T / self._outer
+            if not np.array_equal(self._added[key], self._Q):
+                self._calmer.add(key)
             with suppress(SolverError):
                 P = prediction_covariance(A, C[there], own, R[there], scale) / self._outer
                 self._steady[key] = P, kalman_gain(self._C, np.ones(len(R)), P, there)
@@ -156,6 +162,8 @@ class SampledFilter:
         self._held: FloatArray | None = None
         self._seen: FloatArray | None = None
         self._spread: FloatArray | None = None
+        self._off: FloatArray | None = None  # what the estimate is off by, where P is not that
+        self._onward: FloatArray | None = None  # A (I - K C) and A K of a gain that is held
         self._samples = 0
 
     def correct(
@@ -189,7 +197,8 @@ class SampledFilter:
     def innovations(self) -> FloatArray:
         """Variances of what the outputs of the next sample are off their predictions by, (ny,)."""
         if self._spread is None:
-            seen = self._seen = self._C @ self._P
+            seen = self._C @ (self._P if self._off is None else self._off)
+            self._seen = seen if self._off is None else None
             self._spread = self._R * (1.0 + np.einsum("ij,ij->i", seen, self._C))
         return self._spread
 
@@ -200,9 +209,15 @@ class SampledFilter:
         """
         key = there.tobytes() if C is None else b""
         if key != self._there:
-            self._there, self._held = key, None
+            self._there, self._held, self._onward = key, None, None
             self._samples = 0
+            if key in self._calmer:
+                self._off = self._P if self._off is None else self._off
+            elif self._off is not None:
+                self._P, self._off, self._seen = self._off, None, None
         if self._held is not None:
+            if self._off is not None:
+                self._carry(self._held / self._back)
             return self._held
         P, seen = self._P, self._seen
         rows = self._C if C is None else C * self._unit
@@ -213,6 +228,8 @@ class SampledFilter:
         root = dtrtri(dpotrf(seen @ rows.T * there + self._eye, lower=1)[0], lower=1)[0]
         told = root @ seen
         gain = told.T @ root
+        if self._off is not None:
+            self._carry(gain)
         self._seen = self._spread = None
         self._samples += 1
         if self._samples % _LOOKED == 0 and key in self._steady:
@@ -222,7 +239,7 @@ class SampledFilter:
             added = np.sum((across @ P) * across, axis=1) + np.sum(off * off, axis=1)
             if np.all(added <= _SETTLED * np.diag(P)):
                 self._P = steady
-                self._held = np.asarray(held * self._back)
+                self._held, self._onward = np.asarray(held * self._back), None
                 return self._held
         half = self._half @ (P - told.T @ told) @ self._A.T
         self._P = half + half.T  # what is not symmetric an unstable plant would blow up
@@ -231,6 +248,16 @@ class SampledFilter:
         if not self._P.diagonal().max() <= _LOST:
             self._begin()
         return np.asarray(gain * self._back)
+
+    def _carry(self, gain: FloatArray) -> None:
+        """Carry what the estimate is off by over a sample with a gain that is not made for it."""
+        assert self._off is not None
+        if self._onward is None or self._held is None:
+            across = self._A @ gain
+            self._onward = np.hstack([self._A - across @ self._C, across])
+        kept, across = np.hsplit(self._onward, [len(gain)])
+        half = 0.5 * (kept @ self._off @ kept.T + across @ across.T + self._Q)
+        self._off, self._spread = half + half.T, None
 
 
 def corrected(P: FloatArray, C: FloatArray, R: FloatArray, gain: FloatArray) -> FloatArray:

@@ -35,7 +35,7 @@ _Mask = npt.NDArray[np.bool_]
 _LIMIT = 6.0  # standard deviations
 _MEMORY = 30.0  # in which it is learnt how large they are [s]
 # The least of them over what is claimed: a filter made robust trusts its sensors too little.
-_LEAST = np.array([1.0] * 4 + [0.01] * 4)
+_LEAST = np.array([1.0] * 4 + [0.1] * 4)
 _LEARNING = 20.0  # before which nothing is turned away but what does not move [s]
 _ROW, _LONGEST = 20, 2.0  # samples in a row, or [s], after which unit and encoder begin anew
 _UPDATES, _MOVED = 5, 5.0  # updates without change, while so many standard deviations are expected

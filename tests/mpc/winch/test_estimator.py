@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from itertools import product
 
 import numpy as np
 import pytest
+import scipy.linalg
 from mpc_cases import WEIGHTS, case_of
 
 import models
@@ -86,24 +88,54 @@ def test_the_gain_of_all_signals_is_no_filter_without_the_payloads():
 
 
 def test_gains_of_changing_signals_are_those_of_the_textbooks_recursion():
+    """Also of signals whose gains reckon with less noise than there is, and after those.
+
+    What an estimate is off by then is another covariance than that which made its gains: load and
+    rope are less known than those hold, and who takes up those with the signals that come back
+    gives a wave that he missed to a constant force.
+    """
     model = model_of("thesis-1975")
     P, mute = np.array(model.covariance), signals("mru", "encoder")
     A, Q = model.A, model.G @ model.G.T
     less, size = 0.25 * Q, np.sqrt(np.diag(P)) + 1e-12
     gains = SampledFilter(A, model.C, model.G, model.R, P, {mute.tobytes(): 0.5 * model.G})
     rng = np.random.default_rng(16)
+    off = None  # what the estimate is off by, where P is not that
     for k in range(60):
-        there = mute if k % 7 == 3 else rng.random(len(MEASURED)) < 0.5
+        there = mute if k % 7 in (2, 3) else rng.random(len(MEASURED)) < 0.5
         late = k % 7 == 5  # telegrams of another age than usual
         C = model.C * (1.0 + 0.1 * rng.random(model.C.shape)) if late else model.C
-        expected = kalman_gain(C, model.R, P, there)
         if k % 4:  # whoever asks beforehand finds the same
-            spread = np.diag(model.C @ P @ model.C.T) + model.R
+            spread = np.diag(model.C @ (P if off is None else off) @ model.C.T) + model.R
             np.testing.assert_allclose(gains.innovations, spread, rtol=1e-6)
+        if there is mute:
+            off = P if off is None else off
+        elif off is not None:
+            P, off = off, None
+        expected = kalman_gain(C, model.R, P, there)
         found = gains.at(there, C if late else None)
         scaled = (found - expected) * np.sqrt(model.R) / size[:, None]
         assert np.abs(scaled).max() < 1e-6
         P = A @ corrected(P, C, model.R, expected) @ A.T + (less if there is mute else Q)
+        if off is not None:
+            off = A @ corrected(off, C, model.R, expected) @ A.T + Q
+
+
+def test_what_is_not_heard_of_for_long_is_as_far_off_as_its_steady_gain_leaves_it():
+    """On a gain that is held, too: by Lyapunov's equation of the errors."""
+    model = model_of("thesis-1975-rope")
+    gains, there = WinchEstimator(model), signals("mru", "encoder")
+    for _ in range(150_000):  # constants are forgotten in an hour
+        last = gains.at(there)
+    assert np.array_equal(last, gains.steady(there))
+    A = model.A.copy()
+    at = np.arange(model.constants_at.start, model.constants_at.stop)
+    A[at, at] = math.exp(-T / 3600.0)
+    kept = A @ (np.eye(model.size) - last @ model.C)
+    added = model.G @ model.G.T + A @ (last * model.R) @ last.T @ A.T
+    off = scipy.linalg.solve_discrete_lyapunov(kept, added)
+    spread = np.diag(model.C @ off @ model.C.T) + model.R
+    np.testing.assert_allclose(gains.innovations, spread, rtol=0.02)
 
 
 def test_a_set_that_lasts_comes_to_its_steady_gain_and_is_held_there():

@@ -274,6 +274,18 @@ class Faulty:
         return self._controller.step(Measurement(values), time)
 
 
+@pytest.mark.parametrize(
+    ("name", "seeds"), [("thesis-1975", (100, 106, 117)), ("subsea-crane", (0,))]
+)
+def test_a_unit_is_believed_from_its_first_steep_wave_to_the_end_of_the_run(name, seeds):
+    """A calm of twenty seconds is no measure of it; and what it hears does not jump at the end."""
+    case = models.load_case(name)
+    controller = LinearMPC(case, weights=WEIGHTS[name])
+    for seed in seeds:
+        sh.simulate(case, controller, seeds=[seed], duration=30.0)
+        assert controller.counts["gated"] == 0, seed
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("name", ["subsea-crane", "thesis-1975"])
 def test_sensors_that_lie_do_not_move_the_load(controllers, name, fault):
