@@ -22,7 +22,7 @@ from models.sensing import SET_POINT, SwitchingShape, error_density
 
 from ..limits import Limit
 from .columns import SeaColumn
-from .responses import DragResponses, SeaMoments
+from .responses import DragResponses, SeaMoments, quadratic
 from .systems import System
 
 LOWEST, HIGHEST = 0.01, 30.0  # H_s that are looked at [m]
@@ -108,18 +108,20 @@ class SeaStates:
         NaN where there are none: no stationary motion, or one that does not vanish with the sea.
         """
         system, rows = self.system, densities[0].shape[0]
+        speeds = self.responses.speeds(densities)
         if system.loss is None:
-            return [self._drag(densities, [np.zeros(rows)])]
+            return [self._drag(speeds[0][0], self.responses.denominators(np.zeros(rows)))]
         # By substitution; where that leaves the bracket, as it would go back and forth between
         # a drum that is stuck and one that swings, by its middle.
         edge = system.friction_edge
         slack = np.full(rows, min(system.loss.begin, 0.5 * edge))
         low, high = np.full(rows, _FAINT * edge), np.full(rows, edge)
         for _ in range(_LOSS_ROUNDS):
-            C = self._drag(densities, [np.zeros(rows), slack])
-            known = [np.where(np.isfinite(C), C, system.reference), slack]
-            turned = self.responses.weighted_speeds(densities, known)[1]
-            found = system.loss.coefficient(self.responses.variance(turned, known))
+            below = self.responses.denominators(slack)
+            C = self._drag(quadratic(speeds[0], slack), below)
+            D = np.where(np.isfinite(C), C, system.reference) - system.reference
+            turned = quadratic(speeds[1], D) / quadratic(below, D)
+            found = system.loss.coefficient(turned.sum(axis=1))
             low, high = np.where(found > slack, slack, low), np.where(found < slack, slack, high)
             if np.all(np.abs(found - slack) <= _LOSS_AGREES * slack):
                 break
@@ -130,23 +132,27 @@ class SeaStates:
             slack = ahead
         return [C, slack]
 
-    def _drag(self, densities: Sequence[FloatArray], known: Sequence[FloatArray]) -> FloatArray:
-        """Return the drag that agrees with the motion for known losses, (r,) [N s/m]."""
+    def _drag(self, weighted: FloatArray, below: FloatArray) -> FloatArray:
+        """Return the drag that agrees with the motion for known losses, (r,) [N s/m].
+
+        By the numerator of the spectrum of the payload's velocity (r, n) and its denominator, a
+        quadratic in the drag (3, r, n), see `DragResponses.speeds`.
+        """
         system = self.system
-        rows = densities[0].shape[0]
+        rows = len(weighted)
         low, high = system.stable_range
         if low > high or system.swings:
             return np.full(rows, np.nan)
         if system.slope == 0.0:
             return np.full(rows, system.reference)
+        below = np.broadcast_to(below, (3, *weighted.shape))
+
         # C = slope sigma_v(C) is one equation in one unknown: its sides are compared in a bounded
         # ratio over log C, which a bracketing method likes whatever the sea.
-        weighted = self.responses.weighted_speeds(densities, known)[0]
-
         def surplus(size: FloatArray, row: FloatArray) -> FloatArray:
             C, at = np.exp(size), row.astype(np.intp)
-            speed = self.responses.variance(weighted[at], [C, *(own[at] for own in known[1:])])
-            wanted = system.slope * np.sqrt(np.maximum(speed, 0.0))
+            spectra = weighted[at] / quadratic(below[:, at], C - system.reference)
+            wanted = system.slope * np.sqrt(np.maximum(spectra.sum(axis=1), 0.0))
             # An unstable loop moves without end, however large its spectral integral.
             found = (wanted - C) / (wanted + C)
             return np.where((low < C) & (high > C), found, 1.0)

@@ -160,34 +160,51 @@ class DragResponses:
         found = [np.ones_like(D), D]
         return found + [factor * coefficients[1] for factor in found] if self.losses else found
 
-    def weighted_speeds(
-        self, densities: Sequence[FloatArray], coefficients: Sequence[FloatArray]
-    ) -> list[FloatArray]:
-        """Return what `variance` sums up of the velocity and of the motor's speed, (r, n) each.
+    def speeds(self, densities: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return the numerators of the spectra of payload's velocity and motor's speed, (3, r, n).
 
-        The first does not depend on the drag, nor the other on the losses.  Densities of the
-        disturbances at the nodes are one-sided, (r, n) or (1, n) each; coefficients are of drag [N
-        s/m] and of losses [N m s/rad], (r,) each.
+        They are quadratics, weighted for a sum over the nodes: that of the payload in the
+        coefficient of losses, which is there only where there are any, that of the motor in the
+        drag less `reference`.  Densities of the disturbances at the nodes are one-sided, (r, n) or
+        (1, n) each.
         """
         o, w = len(self.outputs), self.table.shape[1] - 1 - self.losses
-        t, rows = self.table, [self.table[o, :w]]
+        t = self.table
+        parts = [(t[o, :w], np.zeros_like(t[o, :w]))]
         if self.losses:
-            D, b = (x[:, None, None] for x in self._factors(coefficients)[1:3])
-            moved = rows[0] + b * (t[o, :w] * t[-1, -1] - t[o, w + 1] * t[-1, :w])
-            turned = t[-1, :w] + D * (t[-1, :w] * t[o, w] - t[-1, w] * t[o, :w])
-            rows = [moved.swapaxes(0, 1), turned.swapaxes(0, 1)]
-        return [
-            np.asarray(
-                sum(s * d for s, d in zip(np.abs(row) ** 2, densities, strict=True))
-                * self.nodes.weights,
-                dtype=np.float64,
-            )
-            for row in rows
-        ]
+            parts = [
+                (t[o, :w], t[o, :w] * t[-1, -1] - t[o, w + 1] * t[-1, :w]),
+                (t[-1, :w], t[-1, :w] * t[o, w] - t[-1, w] * t[o, :w]),
+            ]
+        found = []
+        for part in parts:
+            sizes = np.moveaxis(_square(*part), 1, 0)  # (w, 3, n)
+            each = (s[:, None] * d for s, d in zip(sizes, densities, strict=True))
+            found.append(np.asarray(sum(each) * self.nodes.weights, dtype=np.float64))
+        return found
 
-    def variance(self, weighted: FloatArray, coefficients: Sequence[FloatArray]) -> FloatArray:
-        """Return the variance of a speed (r,) of :meth:`weighted_speeds` (r, n)."""
-        return np.asarray((weighted / self._denominator(coefficients)).sum(axis=1))
+    def denominators(self, slack: FloatArray) -> FloatArray:
+        """Return the denominators of all spectra, quadratics in the drag less `reference`.
+
+        `slack` is the coefficient of losses (r,), which is 0 where there are none; (3, r, n).
+        """
+        if not self.losses:
+            vf = self.table[len(self.outputs), -1]
+            return _square(np.ones_like(vf), vf)[:, None]
+        whole, x = self._determinants, slack[:, None]
+        return whole[:, 0, None] + x * (whole[:, 1, None] + x * whole[:, 2, None])
+
+    @cached_property
+    def _determinants(self) -> FloatArray:
+        """Coefficients of the denominators by powers of drag and losses, (3, 3, n)."""
+        o, w = len(self.outputs), self.table.shape[1] - 2
+        vf, vg = self.table[o, w], self.table[o, w + 1]
+        sf, sg = self.table[-1, w], self.table[-1, -1]
+        both = vf * sg - vg * sf
+        one = np.ones_like(vf)
+        # |1 + b sg + D (vf + b both)|^2
+        middle = [vf.real, both.real + (sg.conj() * vf).real, (sg.conj() * both).real]
+        return np.stack([_square(one, sg), 2.0 * np.stack(middle), _square(vf, both)])
 
     def moments(
         self, densities: Sequence[FloatArray], coefficients: Sequence[FloatArray]
@@ -228,13 +245,16 @@ class DragResponses:
         return np.asarray(np.abs(changed) ** 2 / self._denominator(known)[0])
 
     def _denominator(self, coefficients: Sequence[FloatArray]) -> FloatArray:
-        o, w = len(self.outputs), self.table.shape[1] - 1 - self.losses
-        vf = self.table[o, w]
-        if self.losses:
-            vg, sf, sg = self.table[o, w + 1], self.table[-1, w], self.table[-1, -1]
-            _, D, b, both = (factor[:, None] for factor in self._factors(coefficients))
-            found = 1.0 + D * vf + b * sg + both * (vf * sg - vg * sf)
-            return np.asarray(found.real**2 + found.imag**2)
-        D = (coefficients[0] - self.reference)[:, None]
-        # The modulus without complex numbers: this is what the search for the drag spends.
-        return np.asarray(1.0 + D * (2.0 * vf.real + D * np.abs(vf) ** 2))
+        slack = coefficients[1] if self.losses else np.zeros(1)
+        return quadratic(self.denominators(slack), coefficients[0] - self.reference)
+
+
+def quadratic(coefficients: FloatArray, x: FloatArray) -> FloatArray:
+    """Return quadratics of coefficients (3, r, n) at x (r,), (r, n)."""
+    x = x[:, None]
+    return np.asarray(coefficients[0] + x * (coefficients[1] + x * coefficients[2]))
+
+
+def _square(one: ComplexArray, other: ComplexArray) -> FloatArray:
+    """Return the coefficients of |one + x other|^2, a quadratic in a real x, (3, ..)."""
+    return np.stack([np.abs(one) ** 2, 2.0 * (one.conj() * other).real, np.abs(other) ** 2])
