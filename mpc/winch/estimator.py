@@ -28,6 +28,7 @@ _AT = np.array([HEARD.index(name) for name in MEASURED])
 _AGE, _FRESH = HEARD.index("payload.age"), HEARD.index("payload.valid")
 _UNIT = HEARD.index("mru.valid")
 _TELEMETRY, _REFERENCE = slice(0, 3), slice(3, 5)  # among the measurements
+_VELOCITY = MEASURED.index("payload.velocity")
 _GROUPS = 3, 2, 2, 1  # measurements of telegram, reference unit, encoder and load cell
 _FORGOTTEN = 3600.0  # in which the gains let constants be forgotten of which nothing tells [s]
 _APPLIED = HEARD.index("drive.applied")
@@ -64,14 +65,11 @@ class WinchEstimator(SampledFilter):
         # Of what the drive cuts from a command that has arrived.
         self._cut = np.pad(winch.from_constants[:, 1] * winch.gain, more)
         self._velocity, self._speed = np.pad(winch.velocity, more), np.pad(winch.reckoned, more)
-        # The accelerometer feels a force at once, so that it is in what telemetry takes in at this
-        # sample (`_sent`, still on its way) and, with a delay below a sample, in a part of what
-        # arrives now (`_felt`).
-        self._sent, self._felt = np.zeros(model.size), np.zeros(len(MEASURED))
-        self._felt[_TELEMETRY] = winch.force_felt * np.maximum(0.0, 1.0 - delays / T)
-        for felt, name in zip(winch.force_felt, MEASUREMENTS, strict=True):
-            if model.depth[name]:
-                self._sent[model.first[name]] = felt
+        # The accelerometer feels a force at once: one of now in what telemetry tells of now, one of
+        # then in what comes late.
+        self._felt = np.zeros(len(MEASURED))
+        self._felt[_TELEMETRY] = winch.force_felt
+        self._usual_share = self._share_of_now(delays / T)
         self.gate = SignalGate(model)
         # For the gains the constants are forgotten in an hour: one of which nothing tells would
         # else drift for ever.
@@ -119,7 +117,7 @@ class WinchEstimator(SampledFilter):
                 ahead = ahead + self._cut * (applied - given)
             # Quadratic drag at the mean of the velocities before and after: no linear model has it.
             before, after = self._drag, winch.extra_drag(float(self._velocity @ ahead))
-            ahead = ahead + self._force * (0.5 * (before + after)) + self._sent * before
+            ahead = ahead + self._force * (0.5 * (before + after))
         self._begun = True
         # Age and validity of the telemetry come with it: old values are used as such, and a flag
         # that says "not valid" takes a signal out before its number is looked at.
@@ -127,10 +125,16 @@ class WinchEstimator(SampledFilter):
         age = age if math.isfinite(age) else self._usual
         # What is not shown is not late: a row for an age that grows would have no steady gain.
         told = shown[_FRESH] > 0.5 and age <= self._oldest
-        rows = self._late(age) if told else self._rows
+        rows, of_now = self._late(age) if told else (self._rows, self._usual_share)
         expected = rows @ ahead + self._rest
         error = reading - expected
-        error -= self._felt * winch.extra_drag(float(self._velocity @ ahead))
+        # Drag of then is that of the velocity in the same telegram.  Of the velocity estimated then
+        # it would shake the estimate itself: a filter that trusts its accelerometer, to which an
+        # error of the velocity is one of the force, falls into an oscillation above half a metre
+        # per second.
+        now, then = float(self._velocity @ ahead), float(reading[_VELOCITY])
+        drag, late = winch.extra_drag(now), winch.extra_drag(then if math.isfinite(then) else now)
+        error -= self._felt * (of_now * drag + (1.0 - of_now) * late)
         there = np.abs(error) < _HUGE
         if not told:
             there[_TELEMETRY] = False
@@ -149,15 +153,24 @@ class WinchEstimator(SampledFilter):
         """Take A chi, which the caller has computed among other products, as next prediction."""
         self._ahead = ahead
 
-    def _late(self, age: float) -> FloatArray:
-        """Return C for telemetry of an age [s], which changes by as much for all that it tells."""
+    def _late(self, age: float) -> tuple[FloatArray, FloatArray]:
+        """Return C for telemetry of an age [s], and how much each signal tells of now (ny,).
+
+        Its age changes by as much for all that it tells.
+        """
         if abs(age - self._usual) <= self._slack:
-            return self._rows
+            return self._rows, self._usual_share
         rows, model = self._rows.copy(), self.model
+        samples = (age - self._usual + self._delays) / model.winch.sample_time
         for k, name in enumerate(MEASUREMENTS):
-            samples = (age - self._usual + self._delays[k]) / model.winch.sample_time
-            rows[k] = late_row(model.now[k], model.first[name], model.depth[name], samples)
-        return rows
+            rows[k] = late_row(model.now[k], model.first[name], model.depth[name], samples[k])
+        return rows, self._share_of_now(samples)
+
+    def _share_of_now(self, samples: FloatArray) -> FloatArray:
+        """Return how much each signal tells of now, (ny,), of telemetry so late [samples]."""
+        share = np.ones(len(MEASURED))
+        share[_TELEMETRY] = np.clip(1.0 - samples, 0.0, 1.0)
+        return share
 
 
 def _sets(model: PredictionModel) -> dict[bytes, FloatArray]:
