@@ -2,7 +2,7 @@
 
 A present-day winch (`subsea-crane`) over the starboard quarter of the bundled supply vessel, with
 the gains of the structure `combined`, against the made-up scatter diagram; and the thesis's winch.
-About five minutes.
+About ten minutes.
 """
 
 from __future__ import annotations

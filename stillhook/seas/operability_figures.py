@@ -292,6 +292,10 @@ def heading_figure(study: Operability) -> Figure:
     levels = MaxNLocator(10, steps=[1, 2, 5, 10]).tick_values(0.0, max(float(limit.max()), 0.1))
     bands = BoundaryNorm(levels, 256, extend="neither")
     mesh = left.pcolormesh(edges, rings, limit.T, cmap="viridis", norm=bands)
+    # The layout does not see all that stands around a polar plot.
+    engine = figure.get_layout_engine()
+    assert engine is not None
+    engine.set(rect=(0.0, 0.03, 1.0, 0.94))
     bar = figure.colorbar(mesh, ax=left, shrink=0.8, pad=0.08, location="bottom")
     bar.set_label(r"limiting $H_s$ [m], up to the steepest seas")
     real = contour.limit < breaking_height(contour.periods)
@@ -312,7 +316,10 @@ def heading_figure(study: Operability) -> Figure:
         bbox_to_anchor=(0.5, -0.14),
         fontsize=8.5,
     )
-    for axes, text in ((left, r"limiting $H_s$"), (right, "what binds")):
+    for axes, text in (
+        (left, r"limiting $H_s$"),
+        (right, "what binds"),
+    ):
         _rose(axes, contour.periods)
         axes.set_title(text, fontsize=10.0, loc="center", pad=12.0)
     best = float(np.degrees(contour.headings[int(limit.mean(axis=1).argmax())]))
