@@ -293,9 +293,7 @@ def heading_figure(study: Operability) -> Figure:
     bands = BoundaryNorm(levels, 256, extend="neither")
     mesh = left.pcolormesh(edges, rings, limit.T, cmap="viridis", norm=bands)
     # The layout does not see all that stands around a polar plot.
-    engine = figure.get_layout_engine()
-    assert engine is not None
-    engine.set(rect=(0.0, 0.03, 1.0, 0.94))
+    figure.set_layout_engine("constrained", rect=(0.0, 0.03, 1.0, 0.94))
     bar = figure.colorbar(mesh, ax=left, shrink=0.8, pad=0.08, location="bottom")
     bar.set_label(r"limiting $H_s$ [m], up to the steepest seas")
     real = contour.limit < breaking_height(contour.periods)
