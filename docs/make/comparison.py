@@ -64,7 +64,6 @@ _ONE, _ROPE = CASES
 PARTS: Mapping[str, Part] = {
     "one-mpc": Part(case=_ONE, contenders=("mpc",), seeds=10),
     "one-preview": Part(case=_ONE, contenders=("mpc-preview",), seeds=10),
-    "rope-mpc": Part(case=_ROPE, contenders=("mpc",), seeds=6),
     "rope-preview": Part(case=_ROPE, contenders=("mpc-preview",), seeds=6),
     **{
         f"{case}-{text}": Part(
@@ -93,6 +92,7 @@ PARTS: Mapping[str, Part] = {
     "one-filter": Part(case=_ONE, contenders=(FILTER,), seeds=6, heights=HEIGHTS[:4]),
     "one-linear": Part(case=_ONE, contenders=("none", "thesis", "feedback", "combined"), seeds=10),
     "rope-linear": Part(case=_ROPE, contenders=("none", EAGER), seeds=6),
+    "rope-combined": Part(case=_ROPE, contenders=("combined",), seeds=6, heights=(0.5, *HEIGHTS)),
 }
 
 
