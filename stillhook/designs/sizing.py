@@ -119,17 +119,20 @@ def worth_figure(result: Worth) -> Figure:
 def size_report(sizing: Sizing) -> Report:
     """Return the smallest motors over the gear ratio, the chosen one marked."""
     target, height = quantity(sizing.target, "m"), sizing.case.sea.significant_height
-    given, highest = sizing.given_rms, sizing.highest_height
+    highest = sizing.highest_height
+
+    def left(rms: float, otherwise: str) -> str:
+        return f"payload {quantity(rms, 'm')} rms" if math.isfinite(rms) else otherwise
+
     items: list[Item] = [_motors(sizing)] if sizing.points else []
     if sizing.chosen is not None:
         caption = "The smallest motor over the gear"
         items.append(Drawing("size", caption, lambda: size_figure(sizing)))
-    own = f"payload {quantity(given, 'm')} rms"
     around = [
-        ("whatever the motor", f"payload {quantity(sizing.unlimited_rms, 'm')} rms"),
+        ("whatever the motor", left(sizing.unlimited_rms, "no stable loop keeps the limits")),
         (
             "with the winch as it is",
-            own if math.isfinite(given) else "its limits cannot be kept in this sea",
+            left(sizing.given_rms, "its limits cannot be kept in this sea"),
         ),
         (
             "the winch as it is meets the target",
