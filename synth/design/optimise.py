@@ -191,20 +191,20 @@ def _optimised(
     known = [*known, *gains_in_use(question)]
     given = posed
     answered = _answer(given, count, seed, known, progress)
-    posed, tuning = _on_the_rope(given, *answered, count, seed, progress)
+    posed, tuning = _on_the_rope(given, *answered, known, count, seed, progress)
     if not tuning.ok:
         if tuning.assessment is None or not any(member.drive for member in posed.questions):
             return _family_design(posed, tuning)
         missed = _best_possible(posed, tuning, count, seed, known, progress)
         if isinstance(missed, Design):
             return missed
-        posed, tuning = _on_the_rope(given, *missed, count, seed, progress)
+        posed, tuning = _on_the_rope(given, *missed, known, count, seed, progress)
     design = verified(_family_design(posed, tuning), progress)
     most = 1 if question.data.lumping == "thesis" else MAX_MASSES
     while tuning.ok and not design.ok and 2 * posed.masses <= most:
         # It stands on its own rope only: once more on twice the masses.
         posed = posed.on(2 * posed.masses)
-        tuning = _again(posed.problem, tuning, count, seed, progress)
+        tuning = _again(posed.problem, tuning, count, seed, progress, known)
         design = verified(_family_design(posed, tuning), progress)
     return design
 
@@ -213,13 +213,15 @@ def _on_the_rope(
     given: PosedFamily,
     posed: PosedFamily,
     tuning: Tuning,
+    known: Sequence[Sequence[float]],
     starts: int,
     seed: int,
     progress: Progress | None,
 ) -> tuple[PosedFamily, Tuning]:
     """Return the answer on masses on which it keeps the limits where `evaluate_gains` looks at it.
 
-    Limits hold a reserve for the distributed rope only where no more masses are to be had.
+    Limits hold a reserve for the distributed rope only where no more masses are to be had.  Known
+    points that fewer masses hold to be unstable are looked at again on more.
     """
     damped = tuning.status.startswith(_NO_DESIGN)
     least = 0  # what asked for more masses on the way may be gone
@@ -242,9 +244,10 @@ def _on_the_rope(
                 break
         elif (told := _fitted(posed, tuning)) is posed:
             break
-        posed, tuning = told, _again(told.problem, tuning, starts, seed, progress)
+        again = _again(told.problem, tuning, starts, seed, progress, known)
+        posed, tuning = told, again
     if tuning.ok:
-        posed, tuning = _where_it_is_stable(given, posed, tuning, seed, progress)
+        posed, tuning = _where_it_is_stable(given, posed, tuning, known, seed, progress)
     if damped and not tuning.ok:
         tuning = replace(tuning, status=_damped_too_little(posed, tuning))
     return posed, tuning
@@ -254,6 +257,7 @@ def _where_it_is_stable(
     given: PosedFamily,
     posed: PosedFamily,
     tuning: Tuning,
+    known: Sequence[Sequence[float]],
     seed: int,
     progress: Progress | None,
 ) -> tuple[PosedFamily, Tuning]:
@@ -275,7 +279,7 @@ def _where_it_is_stable(
         return posed, tuning
     again = replace(other, starts=tuning.starts, agreed=tuning.agreed)
     # No leak leads on from here: the search began at one point alone.
-    return _on_the_rope(given, finer, again, 1, seed, progress)
+    return _on_the_rope(given, finer, again, known, 1, seed, progress)
 
 
 def seen_at(
