@@ -76,13 +76,17 @@ def read_rows(path: Path) -> list[dict[str, str]]:
 
 
 def digest_of(script: str) -> str:
-    """Return the digest of the code that a script runs."""
+    """Return the digest of the code that a script runs, scripts that it imports among it.
+
+    This file counts for none: where rows are kept changes no number.
+    """
     from stillhook.keeper import code_digest
 
     path = ROOT / script
+    beside = {other.stem for other in path.parent.glob("*.py")} - {Path(__file__).stem}
     sys.path.insert(0, str(path.parent))
     try:
-        return code_digest(path.stem)
+        return code_digest(path.stem, frozenset(beside))
     finally:
         sys.path.remove(str(path.parent))
 

@@ -26,11 +26,12 @@ _NUMERICAL = ("numpy", "scipy", "casadi", "daqp")
 
 
 @lru_cache(maxsize=32)
-def code_digest(entry: Callable[..., object] | str) -> str:
+def code_digest(entry: Callable[..., object] | str, beside: frozenset[str] = frozenset()) -> str:
     """Return a digest of the code that the results of a function, class or module hang on.
 
     That is the file of the function and every file that it imports, directly or through others,
-    within the toolkit (and the function's own package): at the top or later, in a function.  What
+    within the toolkit, the function's own package and the modules `beside` it, such as the scripts
+    that a script imports: at the top or later, in a function.  What
     is imported for type checkers alone cannot change a number and does not count.  A face
     (`models.basics.lazy`) is looked through to the file that a name comes from, also where it is
     imported whole and only its names are used (``import stillhook as sh``).  Of each file the
@@ -46,7 +47,7 @@ def code_digest(entry: Callable[..., object] | str) -> str:
     collecting = gc.isenabled()
     gc.disable()
     try:
-        for module, content in sorted(_Reached(start).contents.items()):
+        for module, content in sorted(_Reached(start, beside).contents.items()):
             digest.update(f"{module} {content}\n".encode())
     finally:
         if collecting:
@@ -65,8 +66,8 @@ def versions(entry: Callable[..., object] | str) -> dict[str, str]:
 class _Reached:
     """The files that a module reaches, with a digest of each, by the module's name."""
 
-    def __init__(self, start: str) -> None:
-        self._ours = {*_PACKAGES, start.partition(".")[0]}
+    def __init__(self, start: str, beside: frozenset[str] = frozenset()) -> None:
+        self._ours = {*_PACKAGES, start.partition(".")[0], *beside}
         self._faces: dict[str, dict[str, tuple[str, str]]] = {}
         self._homes: dict[str, Path | None] = {}
         self.contents: dict[str, str] = {}
@@ -205,7 +206,8 @@ def _read(node: ast.AST, words: list[str], imports: list[ast.Import | ast.Import
         imports.append(node)
     for field in node._fields:
         value = getattr(node, field, None)
-        if value is None or field == "ctx":
+        # Fields that only some versions have are empty lists where nothing is said.
+        if value is None or field == "ctx" or value == []:
             continue
         words.append(field)
         if isinstance(value, ast.AST):

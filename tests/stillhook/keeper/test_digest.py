@@ -115,6 +115,21 @@ def test_of_a_face_that_is_imported_whole_what_is_used_counts(tree, monkeypatch,
     assert (tree("room/others.py", "5.0", "6.0") != before) == counts
 
 
+def test_a_module_beside_counts_if_it_is_named(tmp_path, monkeypatch):
+    (tmp_path / "a_study.py").write_text("from helpers_of_studies import LEAST\n")
+    helper = tmp_path / "helpers_of_studies.py"
+    monkeypatch.syspath_prepend(tmp_path)
+    found = []
+    for number in (1, 2):
+        helper.write_text(f"LEAST = {number}{'  # more' * number}\n")
+        code_digest.cache_clear()
+        beside = frozenset({"helpers_of_studies"})
+        found.append((code_digest("a_study"), code_digest("a_study", beside)))
+    (alone, first), (same, second) = found
+    assert alone == same
+    assert first != second
+
+
 def test_the_versions_of_the_libraries_count(tree, monkeypatch):
     before = tree()
     real = digest.version
