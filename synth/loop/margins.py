@@ -27,7 +27,9 @@ _HAIR = 0.1  # share of a bracket beside the first guess of a crossing in it
 _ORDER = 10  # of the polynomials about a minimum
 _TABLE = 257  # points at which a polynomial is looked at
 _ROUNDS = 12  # each narrows by a factor of three at least: 3^12 is 5e5
-_NEARER = 0.5  # share of a least height on the grid below which there may be zeros beside it
+_NEARER = 0.95  # share of a least height on the grid below which there may be zeros beside it
+_LOOKS = 4  # at ever closer points about such a height
+_UNEVEN = 0.7  # share of three points' width of which a parabola through them says little
 _LEVEL = 1e-12  # relative depth of a minimum below which it is none
 _RESOLVED = 1e-11  # relative size of a polynomial's last terms where it is as good as the function
 
@@ -87,9 +89,12 @@ def loop_margins(
     def heights(at: ComplexArray) -> FloatArray:
         return np.concatenate([np.abs(at) - 1.0, at.imag])
 
-    turns = _turns(grid, heights(gains))
-    grid, order = np.unique(np.append(grid, turns), return_index=True)
-    gains = np.concatenate([gains, np.atleast_2d(loops(turns))], axis=1)[:, order]
+    for _ in range(_LOOKS):
+        turns = _turns(grid, heights(gains))
+        if not turns.size:
+            break
+        grid, order = np.unique(np.append(grid, turns), return_index=True)
+        gains = np.concatenate([gains, np.atleast_2d(loops(turns))], axis=1)[:, order]
     felt = np.abs(gains) > _NOTHING
     among = np.concatenate([np.ones_like(felt), felt])
     known_there = grid, heights(gains), among, max(error, _CLOSE)
@@ -293,7 +298,7 @@ def _turns(grid: FloatArray, values: FloatArray) -> FloatArray:
     """Return where functions, (f, k), may cross zero twice between two points of a grid.
 
     It is the vertex of the parabola through three points of one sign whose middle one is nearest
-    to zero, if it is much nearer still.
+    to zero, if it is nearer still; where one side is much wider, its middle too.
     """
     left, mid, right = values[:, :-2], values[:, 1:-1], values[:, 2:]
     size = np.abs(mid)
@@ -309,7 +314,10 @@ def _turns(grid: FloatArray, values: FloatArray) -> FloatArray:
         step = -0.5 * (first + bend * (x1 - x0)) / bend
         lowest = f1 + step * (first + bend * (x1 - x0) + bend * step)
         inside = (x0 < x1 + step) & (x1 + step < x2)
-        return np.asarray(np.exp((x1 + step)[inside & (lowest / f1 < _NEARER)]))
+        nearer = inside & (lowest / f1 < _NEARER)
+    wide = np.where(x2 - x1 > x1 - x0, x2, x0)
+    uneven = nearer & (np.abs(wide - x1) > _UNEVEN * (x2 - x0))
+    return np.asarray(np.exp(np.concatenate([(x1 + step)[nearer], 0.5 * (x1 + wide)[uneven]])))
 
 
 def _crossings(

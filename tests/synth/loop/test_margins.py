@@ -156,6 +156,21 @@ def test_two_crossings_between_two_grid_points_are_seen() -> None:
     assert m.gain_down == pytest.approx(1.0 / (3.0 * np.exp(-0.3) - 1.0), rel=1e-9)
 
 
+def test_two_crossings_under_a_lopsided_crest_between_uneven_points_are_seen() -> None:
+    """The parabola through the three points about the crest has no zero: one look is not enough."""
+
+    def loop(omega):
+        u = np.log(omega / 1.675)
+        height = 1.2e-3 - np.where(u < 0.0, 150.0, 90.0) * u**2
+        return -2.75 + 6.0 * u + 1j * np.maximum(height, -3.0)
+
+    grid = np.array([1.0, 1.44, 1.52, 1.612, 1.619, 1.709, 1.728, 1.81, 1.91, 2.03, 3.0])
+    margins = loop_margins(loop, grid, loop(grid))
+    rim = 1.675 * np.exp([-np.sqrt(1.2e-3 / 150.0), np.sqrt(1.2e-3 / 90.0)])
+    assert margins.real_axis_crossings == pytest.approx(rim, rel=1e-9)
+    assert margins.gain_down == pytest.approx(1.0 / (2.75 - 6.0 * np.log(rim[1] / 1.675)))
+
+
 def test_narrow_peak_between_grid_points_is_found() -> None:
     grid = np.geomspace(0.01, 100.0, 60)
 
