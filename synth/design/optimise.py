@@ -804,7 +804,9 @@ def verified(design: Design, progress: Progress | None) -> Design:
     if design.payload_rms > design.payload_rms_before:
         status += "; with the drum held the payload moves less"
     if not checked.ok and not status.startswith(_NO_DESIGN):
-        status = f"not verified: {checked.status}"
+        # What is wrong besides, as with a drive that is too small, is not hidden by it.
+        found = f"not verified: {checked.status}"
+        status = found if design.ok else f"{status}; {found}"
     return replace(
         design,
         ok=design.ok and checked.ok,

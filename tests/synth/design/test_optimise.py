@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from designs import PERFECT_CELL, PERFECT_MRU, THESIS_GAINS, thesis_design
@@ -12,6 +14,7 @@ import stillhook as sh
 from models import InputError
 from models.sensing import sensed_line_at
 from synth.design import evaluate_gains, optimise_gains, prepare
+from synth.design.optimise import verified
 from synth.question import PAYLOAD, pose
 from synth.search import KEPT, search
 
@@ -39,6 +42,22 @@ def test_compensation_is_told_against_the_hook_and_the_drum_held() -> None:
     assert design.residual_held == design.payload_rms / design.payload_rms_before
     assert design.attenuation == pytest.approx(-20.0 * np.log10(design.residual))
     assert design.attenuation_held == pytest.approx(-20.0 * np.log10(design.residual_held))
+
+
+@pytest.mark.parametrize(
+    ("ok", "status", "told"),
+    [
+        (True, "optimal within the limits", "not verified: "),
+        (False, "not feasible at H_s 4 m", "not feasible at H_s 4 m; not verified: "),
+    ],
+)
+def test_a_failed_check_does_not_hide_what_is_wrong_besides(ok, status, told) -> None:
+    found = thesis_design()
+    assert found.margins is not None
+    margins = replace(found.margins, gain_down=0.5 * found.margins.gain_down - 0.1)
+    checked = verified(replace(found, ok=ok, status=status, margins=margins), None)
+    assert not checked.ok
+    assert checked.status.startswith(told + "the check of margins.gain_down failed")
 
 
 def test_an_amplifier_of_its_own_multiplies_the_gains() -> None:
