@@ -9,8 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from wiener import Wiener
 
 from models.basics import one_thread
+from models.hook import HookMotion
+from models.operation import SpectrumMotion
+from models.sensing import MruModel
 from synth.loop import Assessment
 from synth.question import pose
 from synth.verify import LawMatrices, winding_of_plant
@@ -217,3 +221,22 @@ def test_the_tables_of_other_seas_are_those_of_their_rows():
             # Worse than the load that hangs still, or than who knows nothing of what is to come?
             assert np.all(own[0] < np.minimum(own[1], 1.2 * own[2]))
     assert sum(row["part"] == "alarm" for row in rows) == seas.HOURS
+
+
+def test_the_best_forecast_of_the_past_is_the_optimal_predictor():
+    seas = _module("other_seas")
+    best, hook = seas.BestOfPast(seas.winch(1.9)), HookMotion.from_case(seas.winch(1.9))
+    exact = MruModel(None, best.sample_time, hook.displacement.rms, 0)
+    leads = np.array([0.5, 1.0, 3.0, 8.0])
+    at = np.round(leads / best.sample_time).astype(int)
+    oracle = Wiener(hook, exact, past=80.0, floor=seas.EXACT)
+    np.testing.assert_allclose(best.errors[:, at], oracle.errors(leads), rtol=2e-3)
+    # And it errs by what it says.
+    motion = SpectrumMotion(hook=hook).motion(900.0, best.sample_time, 3)
+    best.foresee(motion)
+    z, _, _ = motion.block(0, motion.rows)
+    off = []
+    for now in range(seas.PAST, motion.rows - at[-1], 40):
+        best.update(np.nan, np.nan, False, now * best.sample_time)
+        off.append(best.forecast().displacement[at] - z[now + at])
+    np.testing.assert_allclose(np.std(off, axis=0), best.errors[0, at], rtol=0.15)
