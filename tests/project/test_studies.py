@@ -56,9 +56,9 @@ def test_every_question_is_answered_and_every_design_verified(rows):
     assert set(MAIN) <= set(names) <= set(structures.STRUCTURES)
     asked = structures.questions(names, page.ROPES)
     assert {row.key for row in asked} == set(rows)
-    # In brackets in the table: the best that was found by a link of 1.3 s is not verified.
+    # In brackets in the table: deep down three gains keep no limits on quick telemetry.
     failed = {row.key for row in rows.values() if not row.ok}
-    assert {key[:3] for key in failed} <= {("2000", "drum-feedback", "acoustic")}
+    assert failed <= {("2000", "payload-feedback", "given", delay) for delay in (0.0, 0.025, 0.05)}
     for row in rows.values():
         if row.key in failed:
             continue
