@@ -132,4 +132,12 @@ def older_than_their_code(folder: Path = DOCS / "data") -> list[str]:
             now[script] = digest_of(script)
         if made["code"] != now[script]:
             found.append(f"{path.name}: made by code {made['code']}, {script} is {now[script]} now")
+            continue
+        # Of a study that goes on where it stopped each row says what made it.
+        rows = read_rows(path)
+        older = sum(row.get("code", made["code"]) != made["code"] for row in rows)
+        if older:
+            found.append(
+                f"{path.name}: {older} of {len(rows)} rows made by other code than today's"
+            )
     return found

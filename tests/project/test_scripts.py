@@ -52,6 +52,16 @@ def test_a_study_says_which_code_made_it(stored, tmp_path):
     assert message.startswith("saturation.csv: does not say which code made it")
 
 
+def test_a_study_that_goes_on_says_which_of_its_rows_are_old(stored, tmp_path):
+    code = stored.digest_of(stored.SCRIPTS["holds.csv"])
+    rows = [{"a": 1, "code": code}, {"a": 2, "code": "abc"}]
+    stored.write_rows(tmp_path / "holds.csv", ("a", "code"), rows)
+    (message,) = stored.older_than_their_code(tmp_path)
+    assert message == "holds.csv: 1 of 2 rows made by other code than today's"
+    stored.write_rows(tmp_path / "holds.csv", ("a", "code"), rows[:1])
+    assert stored.older_than_their_code(tmp_path) == []
+
+
 @pytest.mark.ci
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
 def test_a_script_explains_itself(script):
