@@ -49,7 +49,7 @@ SETTLE = 60.0  # before which nothing counts, as in `comparison.csv`
 HEIGHTS = (2.43, 1.9)  # of the floor's part [m]
 # Of the best forecast: samples that it remembers, relative error of the hook that it knows, and
 # distance of the lines of its spectrum [rad/s].
-PAST, EXACT, SPACING = 1600, 1e-4, 2.0 * np.pi / 4000.0
+PAST, EXACT, SPACING = 1600, 1e-3, 2.0 * np.pi / 4000.0
 
 
 def two(long: float, short: float, height: float = 1.9) -> Mapping[str, object]:
@@ -92,7 +92,7 @@ def winch(height: float) -> sh.Case:
 class BestOfPast(PerfectPreview):
     """The best that a linear forecast can do: the normal equations of the sea that is told.
 
-    It knows the true hook of the last 80 s to a ten-thousandth, which no sensors tell; earlier, as
+    It knows the true hook of the last 80 s to a thousandth, as exact sensors tell it; earlier, as
     it has no such past, it is the record itself.  Covariances are sums over the spectrum: nothing
     here is code of the bank's.
     """
