@@ -282,6 +282,6 @@ def test_the_docs_page_shows_the_stored_times(words):
     )  # fmt: skip
     tables = [words.solver_table(solvers, *asked) for asked in {(s.sea, s.moves) for s in solvers}]
     tables += [words.step_table(results), words.plain_table(results)]
-    tables += [words.nonlinear_table([n for n in results.nonlinear if n.name[:6] == "Nonlin"])]
+    tables += [words.nonlinear_table(results.nonlinear)]
     for table in tables:
         assert words.markdown(table) in page, table[1]
