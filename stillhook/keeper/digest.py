@@ -31,12 +31,12 @@ def code_digest(entry: Callable[..., object] | str, beside: frozenset[str] = fro
 
     That is the file of the function and every file that it imports, directly or through others,
     within the toolkit, the function's own package and the modules `beside` it, such as the scripts
-    that a script imports: at the top or later, in a function.  What
-    is imported for type checkers alone cannot change a number and does not count.  A face
-    (`models.basics.lazy`) is looked through to the file that a name comes from, also where it is
-    imported whole and only its names are used (``import stillhook as sh``).  Of each file the
-    syntax tree without its docstrings counts, so that words, comments and line breaks may change;
-    and so do the versions of the numerical libraries.
+    that a script imports: at the top or later, in a function.  What is imported for type checkers
+    alone cannot change a number and does not count.  A face (`models.basics.lazy`) is looked
+    through to the file that a name comes from, also where it is imported whole and only its names
+    are used (``import stillhook as sh``).  Of each file the syntax tree without its docstrings
+    counts, so that words, comments and line breaks may change; and so do the versions of the
+    numerical libraries.
     """
     start = entry if isinstance(entry, str) else entry.__module__
     digest = hashlib.sha256()
