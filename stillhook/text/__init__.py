@@ -11,7 +11,9 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .encoding import take_any_text, write_json
     from .folder import OutputFolder, check_own, folder_name, pictures
+    from .fonts import Face, font_face
     from .hook_words import heading_text, heading_words, sea_words, vessel_words
+    from .images import characters_of, inline_svg, picture
     from .quantities import (
         count,
         decibels,
@@ -40,17 +42,19 @@ if TYPE_CHECKING:
         logarithmic,
         new_figure,
         panel,
-        picture,
         styled,
         typeset,
+        untypeset,
     )
     from .table import (
         Bar,
         Column,
         Drawing,
         Item,
+        Listing,
         Report,
         ReportSection,
+        Sentence,
         Table,
         Written,
         columns,

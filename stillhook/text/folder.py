@@ -129,7 +129,7 @@ class OutputFolder:
 
         Raises InputError if a file cannot be written.
         """
-        from . import style
+        from .images import picture
 
         written: list[Path] = []
         if not self.kinds:
@@ -143,7 +143,8 @@ class OutputFolder:
                 self.discard(*pictures(drawing.name))
                 continue
             for kind in self.kinds:
-                written.append(self.write(f"{drawing.name}.{kind}", style.picture(figure, kind)))
+                image = picture(figure, kind, name=drawing.name, caption=drawing.caption)
+                written.append(self.write(f"{drawing.name}.{kind}", image))
         return written
 
     def discard(self, *patterns: str) -> None:

@@ -6,12 +6,13 @@ what the winch does, black the reference.
 """
 
 import contextlib
-import io
 import logging
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec
+
+from .fonts import FAMILY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
@@ -31,7 +32,7 @@ DASHED = (0, (4, 3))
 
 _STYLE: Any = {
     "font.size": 10.0,
-    "font.family": "DejaVu Sans",  # comes with matplotlib: the same everywhere
+    "font.family": FAMILY,  # comes with matplotlib: the same everywhere
     "axes.titlelocation": "left",
     "axes.labelsize": 10.0,
     "xtick.labelsize": 9.5,
@@ -48,9 +49,9 @@ _STYLE: Any = {
     "axes.spines.right": False,
     "lines.linewidth": 1.8,
     "savefig.facecolor": "white",
-    # The same figure gives the same file: no random identifiers, glyphs as outlines.
+    # The same figure gives the same file: no random identifiers.
     "svg.hashsalt": "stillhook",
-    "svg.fonttype": "path",
+    "svg.fonttype": "none",  # words that can be selected and found, see `images`
 }
 
 
@@ -116,6 +117,17 @@ def typeset(text: str) -> str:
     return re.sub(r"(?<!\$)\b(H_s|T_p|T_z|T_S|M_s)\b", r"$\1$", text)
 
 
+def untypeset(text: str) -> str:
+    """Return the words of a text in which some are set as matplotlib's mathematics.
+
+    Examples
+    --------
+    >>> untypeset(typeset("H_s 2 m, M_s 1.8"))
+    'H_s 2 m, M_s 1.8'
+    """
+    return text.replace("$", "")
+
+
 def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float]) -> None:
     """Write a remark near a point, joined to it by a thin line; `offset` in points."""
     axes.annotate(
@@ -128,13 +140,3 @@ def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float
         arrowprops={"arrowstyle": "-", "color": "#666666", "linewidth": 0.8},
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
     )
-
-
-def picture(figure: Figure, kind: str) -> bytes:
-    """Return a figure as the contents of an `svg` or `png` file."""
-    target = io.BytesIO()
-    # Without a date the same design gives the same file.
-    metadata = {"Date": None} if kind == "svg" else {"Software": "Stillhook"}
-    with styled():
-        figure.savefig(target, format=kind, dpi=150, metadata=metadata)
-    return target.getvalue()

@@ -19,11 +19,44 @@ from .style import Figure
 
 
 @dataclass(frozen=True)
+class Written:
+    """A figure in words of its own, as ``no bound`` for infinity, and where it came from.
+
+    A place is a JSON pointer (RFC 6901), as in ``/limits/motor.torque.peak/value``.
+    """
+
+    value: Any
+    text: str
+    _: KW_ONLY
+    unit: str = ""  #: SI unit of the value, where it is told.
+    file: str = ""  #: The file that holds it, where that is told.
+    field: str = ""  #: Its place in that file.
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """Words and figures in a row, read as one text."""
+
+    parts: tuple[str | Written, ...]
+
+    def __str__(self) -> str:
+        return "".join(part if isinstance(part, str) else part.text for part in self.parts)
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A text as it stands in a file, with the name of that."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
 class Column:
     """A column of a table."""
 
     name: str  #: Its name in data: CSV, JSON.
-    label: str | None = None  #: What people call it; by default its name.
+    label: str | Written | None = None  #: What people call it; by default its name.
     _: KW_ONLY
     unit: str = ""  #: SI unit of its figures, or what `quantities.scale` makes of it.
     digits: int = 3  #: Digits that count.
@@ -34,12 +67,16 @@ class Column:
     @property
     def heading(self) -> str:
         """What stands above it."""
+        if isinstance(self.label, Written):
+            return self.label.text
         return self.name if self.label is None else self.label
 
     def text(self, cell: Any) -> str:
         """Return a cell as people read it: nothing for None and NaN."""
         if isinstance(cell, Written | Bar):
             return cell.text
+        if isinstance(cell, Sentence):
+            return str(cell)
         if cell is None or (isinstance(cell, float) and math.isnan(cell)):
             return ""
         if isinstance(cell, str):
@@ -77,14 +114,6 @@ def columns(text: str) -> tuple[Column, ...]:
 
 
 @dataclass(frozen=True)
-class Written:
-    """A figure in words of its own, as ``no bound`` for infinity."""
-
-    value: Any
-    text: str
-
-
-@dataclass(frozen=True)
 class Bar:
     """A share that is used of something, as a bar; broken above one, pale where none was asked."""
 
@@ -102,12 +131,13 @@ class Bar:
 class Table:
     """Rows of figures and words under headings."""
 
-    title: str = ""  #: What it is about; the heading of the first column where that has none.
+    #: What it is about; the heading of the first column where that has none.
+    title: str | Sentence = ""
     #: Columns, and for each row a cell for each of them: a number, a text, `Written`, `Bar`, or
     #: None.
     columns: tuple[Column, ...]
     rows: Sequence[Sequence[Any]]
-    notes: tuple[str, ...] = ()  #: Sentences that stand below it.
+    notes: tuple[str | Sentence, ...] = ()  #: Sentences that stand below it.
     #: Rows that carry a star, and those that are not as they should be.
     marked: tuple[int, ...] = ()
     broken: tuple[int, ...] = ()
@@ -118,7 +148,7 @@ class Table:
     def headings(self) -> list[str]:
         """Texts above the columns."""
         first, *rest = (column.heading for column in self.columns)
-        return [first or self.title, *rest]
+        return [first or str(self.title), *rest]
 
     def cells(self, row: int) -> list[str]:
         """Return a row as texts."""
@@ -161,15 +191,15 @@ class Drawing:
     draw: Callable[[], Figure]
 
 
-Item = Table | Drawing | str
-
-
 @dataclass(frozen=True)
 class ReportSection:
-    """A part of a report: tables, drawings and sentences under a title."""
+    """A part of a report: tables, drawings, listings and sentences under a title, and parts."""
 
-    title: str
-    items: Sequence[Item]
+    title: str | Sentence
+    items: Sequence["Item"]
+
+
+Item = Table | Drawing | Listing | ReportSection | Sentence | str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,7 +221,17 @@ class Report:
     @property
     def drawings(self) -> list[Drawing]:
         """Every drawing."""
-        return [i for part in self.sections for i in part.items if isinstance(i, Drawing)]
+        return [drawing for part in self.sections for drawing in _drawings(part)]
+
+
+def _drawings(section: ReportSection) -> list[Drawing]:
+    found = []
+    for item in section.items:
+        if isinstance(item, ReportSection):
+            found += _drawings(item)
+        elif isinstance(item, Drawing):
+            found.append(item)
+    return found
 
 
 def markdown(item: Report | Table, drawn: Sequence[str] | None = None) -> str:
@@ -206,17 +246,24 @@ def markdown(item: Report | Table, drawn: Sequence[str] | None = None) -> str:
         mark = {"ok": "Ok", "NOT OK": "Not ok"}.get(item.verdict_mark, item.verdict_mark)
         parts.append(f"**{mark}**: {item.status}." if mark else f"{item.status}.")
     for section in item.sections:
-        there = [
-            item for item in section.items
-            if drawn is None or not isinstance(item, Drawing) or item.name in drawn
-        ]  # fmt: skip
-        parts += [f"## {section.title}"] * bool(section.title and there)
-        for one in there:
-            if isinstance(one, Drawing):
-                parts.append(f"![{one.caption}]({one.name}.svg)")
-            else:
-                parts.append(_sentence(one) if isinstance(one, str) else markdown(one).strip())
+        parts += _section(section, drawn, "##")
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _section(section: ReportSection, drawn: Sequence[str] | None, marks: str) -> list[str]:
+    """Return a section in Markdown, part by part; one without anything in it is left out."""
+    parts = []
+    for one in section.items:
+        if isinstance(one, ReportSection):
+            parts += _section(one, drawn, f"{marks}#")
+        elif isinstance(one, Drawing):
+            shown = drawn is None or one.name in drawn
+            parts += [f"![{one.caption}]({one.name}.svg)"] * shown
+        elif isinstance(one, Listing):
+            parts.append(f"`{one.name}`:\n\n```\n{one.text.rstrip()}\n```")
+        else:
+            parts.append(markdown(one).strip() if isinstance(one, Table) else _sentence(str(one)))
+    return [f"{marks} {section.title}", *parts] if section.title and parts else parts
 
 
 def csv_text(table: Table) -> str:
@@ -226,6 +273,7 @@ def csv_text(table: Table) -> str:
     out.writerow([f"{c.name} [{c.unit}]" if c.unit else c.name for c in table.columns])
     for row in table.rows:
         plain = [cell.value if isinstance(cell, Written | Bar) else cell for cell in row]
+        plain = [str(cell) if isinstance(cell, Sentence) else cell for cell in plain]
         out.writerow([repr(float(cell)) if isinstance(cell, float) else cell for cell in plain])
     return target.getvalue()
 
@@ -236,22 +284,26 @@ def json_data(item: Any) -> Any:
     A report is ``name``, ``about``, ``ok``, ``status`` and ``sections``, each with ``title`` and
     ``items``; of these a table is ``title``, ``columns`` with ``name``, ``label`` and ``unit``,
     ``rows`` with a value for each name of a column, and ``notes``; a drawing is ``figure`` and
-    ``caption``; a sentence is a text.
+    ``caption``; a listing is ``name`` and ``text``; a sentence is a text.
     """
     if isinstance(item, Report):
         head = {"name": item.name, "about": item.about, "ok": item.ok, "status": item.status}
         return {**head, "sections": [json_data(section) for section in item.sections]}
     if isinstance(item, ReportSection):
-        return {"title": item.title, "items": [json_data(each) for each in item.items]}
+        return {"title": json_data(item.title), "items": [json_data(each) for each in item.items]}
     if isinstance(item, Drawing):
         return {"figure": item.name, "caption": item.caption}
+    if isinstance(item, Listing):
+        return {"name": item.name, "text": item.text}
+    if isinstance(item, Sentence):
+        return str(item)
     if isinstance(item, Table):
         names = [column.name for column in item.columns]
         return {
-            "title": item.title,
+            "title": json_data(item.title),
             "columns": [{"name": c.name, "label": c.heading, "unit": c.unit} for c in item.columns],
             "rows": [dict(zip(names, map(json_data, row), strict=True)) for row in item.rows],
-            "notes": list(item.notes),
+            "notes": json_data(item.notes),
         }
     if isinstance(item, Written | Bar):
         return json_data(item.value)
@@ -280,8 +332,9 @@ def _grid(table: Table) -> str:
         for line in ([c.replace("-\n", "-").replace("\n", " ") for c in line] for line in lines)
     )
     # The title stands above, where the first heading is taken.
-    alone = table.title and table.title not in table.headings
-    return f"**{table.title}**\n\n{text}" if alone else text
+    title = str(table.title)
+    alone = title and title not in table.headings
+    return f"**{title}**\n\n{text}" if alone else text
 
 
 def _sentence(text: str) -> str:

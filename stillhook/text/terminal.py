@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from models.basics import PhysicsWarning
 
 from .encoding import as_written
-from .table import Bar, Drawing, Report, Table
+from .table import Bar, Drawing, Listing, Report, ReportSection, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -63,8 +63,8 @@ def show(item: Report | Table, out: Console) -> None:
     wide = len(item.columns) >= _WIDE
     grid = Grid(box=None, pad_edge=False, padding=(0, 1 if wide else 2, 0, 0), header_style="bold")
     grid.show_header = not bare
-    if item.title and item.title != item.headings[0]:
-        out.print(item.title, style="bold", soft_wrap=True)
+    if str(item.title) not in ("", item.headings[0]):
+        out.print(str(item.title), style="bold", soft_wrap=True)
     headings, *rows = (
         [as_written(text, out.encoding) for text in line]
         for line in (item.headings, *map(item.cells, item.shown))
@@ -90,12 +90,11 @@ def show(item: Report | Table, out: Console) -> None:
     indent = (0, 0, 0, 0 if wide else 2)
     out.print(Padding(grid, indent, expand=False))
     for note in item.notes:
-        out.print(Padding(Text(as_written(note, out.encoding)), indent, expand=False))
+        out.print(Padding(Text(as_written(str(note), out.encoding)), indent, expand=False))
 
 
 def _show_report(report: Report, out: Console) -> None:
     """Write title, verdict and sections, a line between them; drawings have files of their own."""
-    from rich.padding import Padding
     from rich.text import Text
 
     about = f": {report.about}" if report.about else ""
@@ -107,19 +106,28 @@ def _show_report(report: Report, out: Console) -> None:
         verdict = Text.assemble((mark, style), f": {report.status}") if mark else report.status
         out.print(verdict, soft_wrap=True)
     for section in report.sections:
-        items = [item for item in section.items if not isinstance(item, Drawing)]
-        if items:
-            out.print()
-        if items and section.title:
-            out.print(section.title, style="bold", soft_wrap=True)
-        for k, item in enumerate(items):
-            if isinstance(item, str):
-                text = Text(as_written(item.strip("`"), out.encoding))
-                out.print(Padding(text, (0, 0, 0, 2), expand=False))
-                continue
+        _show_section(section, out)
+
+
+def _show_section(section: ReportSection, out: Console) -> None:
+    from rich.padding import Padding
+    from rich.text import Text
+
+    items = [item for item in section.items if not isinstance(item, Drawing)]
+    if items:
+        out.print()
+    if items and section.title:
+        out.print(str(section.title), style="bold", soft_wrap=True)
+    for k, item in enumerate(items):
+        if isinstance(item, ReportSection):
+            _show_section(item, out)
+        elif isinstance(item, Table):
             if k and isinstance(items[k - 1], Table):
                 out.print()
             show(item, out)
+        else:
+            words = item.text if isinstance(item, Listing) else str(item).strip("`")
+            out.print(Padding(Text(as_written(words, out.encoding)), (0, 0, 0, 2), expand=False))
 
 
 def commands(rows: Sequence[tuple[str, str]], out: Console) -> None:

@@ -314,7 +314,7 @@ def _figures(swept: Swept, folder: OutputFolder) -> None:
         result = result.isel(case=~np.isin(result["status"].to_numpy(), UNKNOWN))
     for name, figure in sweep_figures(result, design).items():
         for kind in folder.kinds:
-            folder.write(f"{name}.{kind}", picture(figure, kind))
+            folder.write(f"{name}.{kind}", picture(figure, kind, name=name))
 
 
 def _next(

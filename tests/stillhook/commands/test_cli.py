@@ -38,7 +38,7 @@ def handed_over(monkeypatch):
     """Let `optimise` and `evaluate` hand over a design that is made already."""
 
     def hand(design):
-        monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: b"a picture")
+        monkeypatch.setattr("stillhook.text.images.picture", lambda figure, kind, **_: b"a picture")
         monkeypatch.setattr("synth.optimise_gains", lambda case, *structure, **rest: design)
         monkeypatch.setattr("synth.evaluate_gains", lambda case, gains, structure: design)
 
@@ -186,7 +186,7 @@ def test_readme_shows_the_real_demo(run):
 
 
 def test_evaluate_gives_the_figures_of_the_thesis(run, monkeypatch):
-    monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: b"a picture")
+    monkeypatch.setattr("stillhook.text.images.picture", lambda figure, kind, **_: b"a picture")
     ending = run("evaluate", "thesis-1975", "--gains", THESIS, "--out", "here")
     assert ending.status == 1
     assert ending.err == ""
@@ -585,13 +585,13 @@ def test_an_interrupt_while_drawing_keeps_what_is_finished(run, handed_over, mon
     handed_over(thesis_design())
     drawn = []
 
-    def interrupted(figure, kind):
+    def interrupted(figure, kind, **_):
         drawn.append(kind)
         if len(drawn) == 4:
             raise KeyboardInterrupt
         return b"a picture"
 
-    monkeypatch.setattr("stillhook.text.style.picture", interrupted)
+    monkeypatch.setattr("stillhook.text.images.picture", interrupted)
     ending = run("optimise", "thesis-1975", *THREE, "--out", "here")
     assert ending.status == 130
     kept = {"case.yaml", "design.yaml", "payload_spectrum.svg", "payload_spectrum.png"}

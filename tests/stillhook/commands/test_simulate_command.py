@@ -145,7 +145,7 @@ def test_traces_come_in_other_formats(name, suffix, run):
 
 
 def test_an_earlier_simulation_leaves_nothing_behind(run, monkeypatch):
-    monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: b"a picture")
+    monkeypatch.setattr("stillhook.text.images.picture", lambda figure, kind, **_: b"a picture")
     words = ("--duration", "20 s", "--traces", "csv", "--out", "here")
     run("simulate", *CALM, *words, "--seeds", "3")
     Path("here/runs/mine.csv").write_text("mine")
@@ -294,7 +294,7 @@ def test_all_controllers_meet_in_one_table(run):
 
 
 def test_controllers_are_compared_in_figures_and_folders(run, monkeypatch):
-    monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: b"a picture")
+    monkeypatch.setattr("stillhook.text.images.picture", lambda figure, kind, **_: b"a picture")
     words = ("--controller", "feed-forward,none", "--duration", "20 s", "--out", "here")
     ending = run("simulate", *CALM, *words)
     assert ending.status == 0

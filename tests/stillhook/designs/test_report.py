@@ -110,7 +110,7 @@ def test_tables_of_the_summary_are_tables():
 
 @pytest.fixture
 def quick_pictures(monkeypatch):
-    monkeypatch.setattr("stillhook.text.style.picture", lambda figure, kind: kind.encode())
+    monkeypatch.setattr("stillhook.text.images.picture", lambda figure, kind, **_: kind.encode())
 
 
 @pytest.mark.usefixtures("quick_pictures")
