@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         operability,
         weather_windows,
     )
+    from synth.question import SystemFacts, system_facts
     from synth.robust import Family, Robustness, optimise_robust, robustness, schedule_gains
     from synth.sensitivity import Sensitivity, morris_screening, sensitivity, sobol_indices
     from synth.sizing import co_design, pareto_front, size_winch, worth

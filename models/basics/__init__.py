@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         THREE_HOURS,
         SpectrumStatistics,
         attenuation,
+        exceedance_probability,
         fractile_factor,
         most_probable_maximum,
         peak_factor,

@@ -145,6 +145,37 @@ def fractile_factor(t_z: float, probability: float, duration: float = THREE_HOUR
     return math.sqrt(max(peak_factor(t_z, duration) ** 2 - 2.0 * math.log(-math.log(p)), 0.0))
 
 
+def exceedance_probability(factor: float, t_z: float, duration: float = THREE_HOURS) -> float:
+    r"""Return the probability that a level of `factor` sigmas is exceeded in a time [-].
+
+    A Gaussian signal crosses it upwards 1/T_z exp(-x^2/2) times a second (Rice 1944).  High levels
+    are crossed as seldom as by a Poisson process, so that one is reached at all with
+
+    .. math:: 1 - \exp\left(-\frac{T}{T_z} e^{-x^2/2}\right),
+
+    which is :func:`fractile_factor` turned round.  A level at the mean or below it is exceeded
+    with certainty; the period T_z [s] is infinite for a signal at rest, T in s.
+
+    Raises InputError if a period or a duration is not above zero.
+
+    Examples
+    --------
+    The most probable maximum of many, and what nine of ten largest ones stay below:
+
+    >>> round(exceedance_probability(peak_factor(8.0), 8.0), 3)
+    0.632
+    >>> round(exceedance_probability(fractile_factor(8.0, 0.9), 8.0), 3)
+    0.1
+    """
+    time = check_range("extremes", "duration", duration, low=0.0, unit="s", open_low=True)
+    if factor <= 0.0:
+        return 1.0
+    if t_z == math.inf:
+        return 0.0
+    period = check_range("extremes", "t_z", t_z, low=0.0, unit="s", open_low=True)
+    return -math.expm1(-time / period * math.exp(-0.5 * factor**2))
+
+
 def most_probable_maximum(sigma: float, t_z: float, duration: float = THREE_HOURS) -> float:
     """Return the most probable maximum of a Gaussian signal of deviation `sigma` [its unit].
 

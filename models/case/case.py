@@ -8,6 +8,8 @@ and by the `replace` that brings them in.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import warnings
 from collections.abc import Mapping
 from os import PathLike
@@ -16,7 +18,7 @@ from typing import Any
 
 from pydantic import PrivateAttr, ValidationError
 
-from ..basics import InputError, PhysicsWarning
+from ..basics import InputError, PhysicsWarning, read_bytes
 from ..casefile import (
     FOLDER,
     Path,
@@ -39,6 +41,10 @@ _BEFORE: Mapping[tuple[str, ...], Any] = {
     ("rope", "damping_law"): "kelvin-voigt",
     ("sensors", "payload", "noise_enters"): "after-filter",
 }
+
+
+#: Fields that name other files, by their sections; what is in a list goes without its number.
+FILES = (("vessel", "raos"), ("sea", "file"), ("sea", "parts", "file"))
 
 
 class Case(Contents):
@@ -203,4 +209,44 @@ class Case(Contents):
         return isinstance(other, Case) and self.to_dict() == other.to_dict()
 
     def __hash__(self) -> int:
-        return hash(self.model_dump_json())
+        return hash(_canonical(self.to_dict()))
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the contents, 64 hexadecimal digits.
+
+        Equal cases have the same one, wherever they came from and whatever computes it; a changed
+        field makes another.  It is that of `to_dict` as JSON in ASCII with sorted keys and without
+        spaces, floats with the fewest digits that tell them apart, zero without a sign.  A file
+        that the case names counts by what stands in it, and not by where it lies.  A version of
+        Stillhook that knows further fields has another digest.
+
+        Raises InputError if such a file can no longer be read.
+        """
+        tree = _with_contents(self.to_dict())
+        return hashlib.sha256(_canonical(tree).encode("ascii")).hexdigest()
+
+
+def _with_contents(tree: Any, path: tuple[str, ...] = ()) -> Any:
+    """Return plain data with the hash of a file's contents for each file that it names."""
+    if isinstance(tree, dict):
+        return {key: _with_contents(item, (*path, key)) for key, item in tree.items()}
+    if isinstance(tree, list):
+        return [_with_contents(item, path) for item in tree]
+    if path in FILES and FilePath(tree).is_absolute():  # and not the name of bundled data
+        return f"sha256:{hashlib.sha256(read_bytes(tree)).hexdigest()}"
+    return tree
+
+
+def _canonical(tree: Any) -> str:
+    """Return plain data as the one JSON text that says the same."""
+    return json.dumps(_unsigned(tree), sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _unsigned(tree: Any) -> Any:
+    """Return plain data with zeros of one kind: -0.0 equals 0.0, and its text does not."""
+    if isinstance(tree, dict):
+        return {key: _unsigned(item) for key, item in tree.items()}
+    if isinstance(tree, list):
+        return [_unsigned(item) for item in tree]
+    return tree + 0.0 if isinstance(tree, float) else tree

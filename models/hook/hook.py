@@ -35,7 +35,7 @@ from ..basics import (
     read_only,
 )
 from ..case import Case
-from ..sea import SeaSpectrum
+from ..sea import SeaSpectrum, highest_of
 from ..vessel import HeaveRao, heading_remark, hook_rao, speed_remark
 from .encounter import Encounter, MetSpectrum
 
@@ -44,6 +44,8 @@ ORDERS = np.arange(9.0)[:, np.newaxis]
 
 # A Fourier transform whose length has a larger prime factor takes up to twenty times as long.
 _LARGEST_FACTOR = 300
+
+_BAND_POINTS = 4000  # at which the energetic band is looked for
 
 # Above this share of the displacement variance from outside the RAO's table the user is told.
 _SHARE_TO_WARN = 0.05
@@ -183,6 +185,22 @@ class HookMotion:
         table: the omega^-5 tail of a sea leaves an acceleration spectrum that falls with 1/omega.
         """
         return motion_statistics(self.moments)[2]
+
+    @cached_property
+    def energetic_band(self) -> tuple[float, float]:
+        """Frequencies between which 90 % of the displacement's variance lies [rad/s]."""
+        omega = np.geomspace(*self.band, _BAND_POINTS)
+        density = self.density(omega)
+        parts = np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(omega))
+        low, high = np.interp([0.05 * parts[-1], 0.95 * parts[-1]], parts, omega[1:])
+        return float(low), float(high)
+
+    @cached_property
+    def peak_frequency(self) -> float:
+        """Frequency at which the displacement's density is highest [rad/s]."""
+        if self.met is not None:
+            return highest_of(self.density, [self.met.peak_frequency])
+        return highest_of(self.density, [self.sea.peak_frequency, *self.splits])
 
     def warn_if_outside(self) -> None:
         """Warn with a :class:`PhysicsWarning` if over 5 % of the variance is outside the table."""

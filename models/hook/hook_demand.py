@@ -40,14 +40,18 @@ class HookDemand:
     probability: float = 0.9  #: Fractile of the extremes beside the most probable one.
 
     @classmethod
-    def from_case(cls, case: Case, *, probability: float = 0.9) -> HookDemand:
+    def from_case(
+        cls, case: Case, *, probability: float = 0.9, hook: HookMotion | None = None
+    ) -> HookDemand:
         """Return the figures of a case's hook, with its static tension and exposure time.
+
+        The hook's motion is that of the case, unless it is known already.
 
         Raises InputError if the probability does not lie between 0 and 1.
         """
         fractile_factor(1.0, probability)  # tells if it is out of range
         return cls(
-            moments=HookMotion.from_case(case).moments,
+            moments=(HookMotion.from_case(case) if hook is None else hook).moments,
             tension=case.hung_weight,
             drive_tension=case.static_torque_budget * case.winch.gearbox.ratio / case.haul_radius,
             duration=case.limits.exposure_time,

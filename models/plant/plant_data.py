@@ -170,12 +170,16 @@ class PlantData:
 
     @property
     def hung_mass(self) -> float:
-        """Mass that moves in the first mode, about [kg]: load, hook block, a third of the rope.
+        """Mass that moves in the first mode, about [kg]: load, hook block, a share of the rope."""
+        return self.payload_mass + self.block_mass + self.rope_share * self.rope_mass
 
-        All of the rope with the lumping of the thesis.
+    @property
+    def rope_share(self) -> float:
+        """Share of the rope that moves with the load in the first mode, about [-].
+
+        A third, or all of it with the lumping of the thesis.
         """
-        share = 1.0 if self.lumping == "thesis" else 1.0 / 3.0
-        return self.payload_mass + self.block_mass + share * self.rope_mass
+        return 1.0 if self.lumping == "thesis" else 1.0 / 3.0
 
     def axial_modes(self, count: int) -> FloatArray:
         """Return exact axial modes of the chain, the vessel held, from the lowest [rad/s].

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .records import SeaRecords, read_seas
     from .scatter import Scatter
     from .scatter_files import read_scatter, write_scatter
-    from .sea import SHORTEST, SeaSpectrum
+    from .sea import SHORTEST, SeaSpectrum, highest_of
     from .sea_section import Sea
     from .series import LONGEST_GAP, SeaSeries, relative_heading
     from .series_files import holds_series, read_series

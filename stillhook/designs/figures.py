@@ -171,7 +171,7 @@ def _response_finding(view: MotionView) -> str:
     design = view.design
     if not view.compensated:
         return "The loop is unstable: only the drum held is shown"
-    omega = np.geomspace(*view.energetic_band, 300)
+    omega = np.geomspace(*view.hook.energetic_band, 300)
     payload = np.abs(design.assessment.response(PAYLOAD, HOOK_HEAVE, omega))
     held = np.abs(view.held_response(omega))
     gains = f"{number(float(payload.min()), 2)} to {number(float(payload.max()), 2)}"
@@ -227,7 +227,7 @@ def _range(axes: Axes, values: FloatArray, room: float) -> None:
 
 
 def _frame(view: MotionView, axes: Axes, label: str) -> None:
-    low, high = view.energetic_band
+    low, high = view.hook.energetic_band
     axes.axvspan(low, high, color=HOOK, alpha=0.15, linewidth=0.0)
     axes.axhline(1.0, color=REFERENCE, linewidth=0.9, linestyle=DASHED)
     axes.set_ylabel(label)

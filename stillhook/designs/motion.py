@@ -13,16 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import (
-    ComplexArray,
-    FloatArray,
-    adaptive_nodes,
-    most_probable_maximum,
-    zero_crossing_period,
-)
+from models.basics import ComplexArray, FloatArray, most_probable_maximum
 from models.hook import HookMotion
+from models.plant import PlantData
 from synth.design import Design
-from synth.question import locked_response
+from synth.question import held_motion, locked_response
 
 PAYLOAD = "payload.displacement"
 DRUM = "drum.haul"
@@ -70,34 +65,11 @@ class MotionView:
         return every[(every >= low) & (every <= high)]
 
     @cached_property
-    def energetic_band(self) -> tuple[float, float]:
-        """Frequencies between which 90 % of the hook's variance lies [rad/s]."""
-        omega = np.geomspace(*self.hook.band, 4000)
-        density = self.hook.density(omega)
-        parts = np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(omega))
-        low, high = np.interp([0.05 * parts[-1], 0.95 * parts[-1]], parts, omega[1:])
-        return float(low), float(high)
-
-    @cached_property
     def held_period(self) -> float:
         """Mean zero-crossing period of the payload with the drum held [s]."""
-        peak, damping = self._resonance
-        low, high = self.hook.band
-        powers = np.array([[0.0], [2.0]])
-
-        def integrands(omega: FloatArray) -> FloatArray:
-            return np.asarray(omega**powers * self.held_density(omega))
-
-        nodes = adaptive_nodes(
-            integrands,
-            low,
-            high,
-            splits=self.hook.splits,
-            poles=[complex(-damping, peak)],
-            rtol=1e-7,
-        )
-        m0, m2 = (float(m) for m in nodes.integrate(integrands(nodes.omega)))
-        return zero_crossing_period(m0, m2)
+        design = self.design
+        held = held_motion(PlantData.from_case(design.case), self.hook, design.drag_before)
+        return held.mean_period(PAYLOAD)
 
     def motions(self) -> list[tuple[str, float, float, float]]:
         """Return hook and payload, before and after: rms, 4 rms, largest [m].

@@ -11,6 +11,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .design import SOURCE_NAMES, SWITCHING_LOSS, Design
     from .infeasible import shortfall
+    from .loads import RARE, EndLoads, Loads, RopeLoads, design_loads
     from .nested import gains_in_use
     from .optimise import design_of, evaluate_gains, optimise_gains, verified
     from .tuning import LimitUse, Tuning, few_starts, limit_uses, tune, tuning_of

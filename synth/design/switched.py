@@ -156,6 +156,11 @@ class SwitchedSignal:
         return float(np.sum(weights * density * rest * (_density(rise) + rise * ndtr(rise))))
 
     @property
+    def mean_period(self) -> float:
+        """Mean zero-crossing period of the signal [s]."""
+        return 1.0 / self.rate(0.0)
+
+    @property
     def variance(self) -> float:
         """The variance of the signal, in its unit squared."""
         weights, mean, _, variance, _, _ = self._turns

@@ -27,6 +27,16 @@ if TYPE_CHECKING:
     from .limits import Limit, Size, Symbols
     from .margin_limits import DelayMargin, GainMargin, GainMarginDown
     from .pole_limits import HighestFrequency, LeastDamping, LeastDecay
-    from .signal_limits import Breakdown, Continuous, Minimum, Peak, Power, Rms, Thermal
+    from .signal_limits import (
+        Amplification,
+        Breakdown,
+        Continuous,
+        Minimum,
+        Peak,
+        Peaks,
+        Power,
+        Rms,
+        Thermal,
+    )
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from scipy.special import ndtr
@@ -28,6 +28,13 @@ if TYPE_CHECKING:
     from ..loop import Assessment
 
 _STILL = 1e-12  # a speed's variance over the base speed squared that is none
+
+
+class Peaks(Protocol):
+    """What a largest value is measured of: a loop, a search's symbols, or seas by their moments."""
+
+    def peak(self, output: str, duration: float) -> Any:
+        """Return the most probable maximum of `output` in `duration` [s], without its mean."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,8 +184,22 @@ class Peak(_OfOneSignal):
         return self.measure(symbols) / bound - 1.0
 
     @override
-    def measure(self, loop: Assessment | Symbols) -> Any:
+    def measure(self, loop: Peaks) -> Any:
         return abs(self.static) + self.loss + loop.peak(self.output, self.duration)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Amplification(Peak):
+    """(static + loss + k sigma)/static of `output` at most `bound`: a dynamic amplification factor.
+
+    The largest tension over that at rest (the DAF of DNV-RP-N103).
+    """
+
+    kind: ClassVar[str] = "daf"
+
+    @override
+    def measure(self, loop: Peaks) -> Any:
+        return super().measure(loop) / self.static
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,7 +217,7 @@ class Minimum(_OfOneSignal):
         return (bound - self.measure(symbols)) / abs(self.static)
 
     @override
-    def measure(self, loop: Assessment | Symbols) -> Any:
+    def measure(self, loop: Peaks) -> Any:
         return self.static - self.loss - loop.peak(self.output, self.duration)
 
     @override
@@ -233,7 +254,7 @@ class Power(Limit):
         return self.measure(symbols) / bound - 1.0
 
     @override
-    def measure(self, loop: Assessment | Symbols) -> Any:
+    def measure(self, loop: Peaks) -> Any:
         torque = abs(self.static) + self.loss + loop.peak(self.torque, self.duration)
         return torque * loop.peak(self.speed, self.duration)
 
@@ -251,6 +272,6 @@ class Breakdown(Power):
     unit: str = "N m"
 
     @override
-    def measure(self, loop: Assessment | Symbols) -> Any:
+    def measure(self, loop: Peaks) -> Any:
         fast = loop.peak(self.speed, self.duration) / self.base_speed
         return super().measure(loop) / self.base_speed * fast

@@ -16,7 +16,17 @@ from models.basics import InputError, check_range, parse_quantity
 from models.case import Case
 from models.plant import LinearPlant
 
-from ..limits import LOWER_TENSION, PAYLOAD, Limit, Minimum, Peak, Rms, Symbols, drive_limits
+from ..limits import (
+    LOWER_TENSION,
+    PAYLOAD,
+    Amplification,
+    Limit,
+    Minimum,
+    Peak,
+    Rms,
+    Symbols,
+    drive_limits,
+)
 
 if TYPE_CHECKING:
     from ..loop import Assessment
@@ -35,17 +45,6 @@ class Significant(Rms):
     @override
     def measure(self, loop: Assessment) -> float:
         return 4.0 * super().measure(loop)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Amplification(Peak):
-    """(static + k sigma)/static of `output` at most `bound`: the dynamic amplification factor."""
-
-    kind: ClassVar[str] = "daf"
-
-    @override
-    def measure(self, loop: Assessment | Symbols) -> Any:
-        return super().measure(loop) / self.static
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,6 @@ from models.plant import LinearPlant, PlantData
 from models.rig import MRU
 from models.sensing import SwitchingNoise, coherent_error
 
-from ..limits import LOWER_TENSION
 from ..loop import (
     Assessment,
     Disturbance,
@@ -31,7 +30,7 @@ from ..loop import (
     LoopResponses,
     LossElement,
 )
-from ..question import HOOK, PAYLOAD, held_poles, held_transfers
+from ..question import HOOK, held_poles, held_responses
 from .responses import DragResponses
 
 VELOCITY, FORCE = "payload.velocity", "payload.force"
@@ -192,15 +191,7 @@ class HeldSystem(System):
     @override
     def transfers(self, omega: FloatArray) -> ComplexArray:
         s = 1j * omega.astype(np.complex128)
-        P_Y, P_F, T_Y, T_F = held_transfers(self.data, s, self.reference)
-        reeved = self.data.mean_sheaves_factor / self.data.falls
-        D = self.data.payload_mass * s**2 + self.reference * s
-        rows = {
-            PAYLOAD: (P_Y, P_F),
-            VELOCITY: (s * P_Y, s * P_F),
-            "rope.tension": (reeved * T_Y, reeved * T_F),
-            LOWER_TENSION: (D * P_Y, D * P_F - 1.0),
-        }
+        rows = held_responses(self.data, s, self.reference)
         return np.array([rows[z] for z in (*self.outputs, VELOCITY)])
 
     @override

@@ -19,6 +19,16 @@ if TYPE_CHECKING:
         least_damping_text,
         pose_family,
     )
+    from .held import (
+        HeldMotion,
+        held_modes,
+        held_motion,
+        held_poles,
+        held_responses,
+        held_transfers,
+        locked_response,
+        uncompensated,
+    )
     from .loop_numbers import LoopNumbers, Point, moment_weights, on_sides
     from .problem import Goal, Problem, Values
     from .question import (
@@ -28,14 +38,19 @@ if TYPE_CHECKING:
         controller_for,
         equivalent_elements,
         heard_spectra,
-        held_poles,
-        held_transfers,
         loaded_plant,
-        locked_response,
         pose,
-        uncompensated,
         with_masses,
     )
     from .rope_masses import masses_for, on_common_masses, on_enough_masses
+    from .system import (
+        AxialMode,
+        HeldFacts,
+        RopeFacts,
+        SystemFacts,
+        WaveBand,
+        WinchFacts,
+        system_facts,
+    )
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

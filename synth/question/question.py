@@ -22,7 +22,6 @@ from models.basics import (
     ComplexArray,
     FloatArray,
     PhysicsWarning,
-    adaptive_nodes,
     wave_number,
 )
 from models.case import Case
@@ -32,8 +31,6 @@ from models.plant import (
     Plant,
     PlantData,
     build_plant,
-    rope_transfers,
-    settled_drag,
 )
 from models.sensing import (
     LOAD,
@@ -74,6 +71,7 @@ from ..structures import (
     structure_aboard,
     structure_named,
 )
+from .held import uncompensated
 from .problem import Problem
 
 GAINS = ("A", "a", "a1", "a2")
@@ -395,90 +393,6 @@ def _sampled(spectrum: Any) -> SampledNoise:
             shares=spectrum.coherent,
         )
     return SampledNoise(spectrum=getattr(spectrum, "density", spectrum))
-
-
-def uncompensated(
-    case: Case, data: PlantData, hook: HookMotion, near: float = 0.0
-) -> tuple[float, float]:
-    """Return drag coefficient [N s/m] and rms payload motion [m] with the drum held.
-
-    On the exact distributed rope (the lumped one spring with the thesis's lumping); drag that
-    is stochastically linearised agrees with the motion.  It is looked for `near` a value, if given.
-    """
-
-    def about(C: float) -> Callable[[float], tuple[float, float]]:
-        """Return a function of the drag to rms motion and velocity, on nodes that suit one."""
-        poles = held_poles(data, C, hook.band[1])
-        if poles[0].real >= 0.0:
-            return lambda other: (math.inf, math.inf)  # undamped resonance: no stationary motion
-
-        def responses(omega: FloatArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
-            s = np.asarray(1j * omega, dtype=np.complex128)
-            P_Y, P_F, *_ = held_transfers(data, s, C)
-            return P_Y, s * P_F, np.array([np.ones_like(omega), omega**2]) * hook.density(omega)
-
-        def spectra(omega: FloatArray) -> FloatArray:
-            P_Y, _, shaken = responses(omega)
-            return np.asarray(np.abs(P_Y) ** 2 * shaken)
-
-        nodes = adaptive_nodes(
-            spectra,
-            *hook.band,
-            splits=hook.splits,
-            poles=[complex(pole) for pole in poles if pole.real < 0.0],
-            rtol=1e-9,
-        )
-        moved, slowed, shaken = responses(nodes.omega)
-        weights = shaken * nodes.weights
-
-        def rms(other: float) -> tuple[float, float]:
-            # More drag is a force on the payload that its velocity makes.
-            variances = weights @ np.abs(moved / (1.0 + (other - C) * slowed)) ** 2
-            motion, velocity = np.sqrt(variances).tolist()
-            return motion, velocity
-
-        return rms
-
-    fixed = case.payload.fixed_drag
-    if fixed is None and data.quadratic_drag > 0.0:
-        tried: list[Callable[[float], tuple[float, float]]] = []
-
-        def velocity(C: float) -> Callable[[float], float]:
-            tried.append(rms := about(C))
-            return lambda other: rms(other)[1]
-
-        fixed = settled_drag(data.quadratic_drag, velocity, near)
-        return fixed, tried[-1](fixed)[0]
-    fixed = fixed or 0.0
-    return fixed, about(fixed)(fixed)[0]
-
-
-def held_poles(data: PlantData, drag: float, highest: float) -> ComplexArray:
-    """Return about where the poles are with the drum held [1/s], the upper half.
-
-    The drag coefficient [N s/m] damps the first mode, as the payload hardly moves in others.  Modes
-    are wanted up to the highest frequency [rad/s].
-    """
-    count = 1 if math.isinf(data.sling_stiffness) else 2
-    if not data.one_spring:
-        wave = math.sqrt(data.axial_stiffness / data.mass_per_length)
-        count += int(highest / (math.pi / data.rope_length * wave))
-    poles = data.damped_modes(count)
-    poles[0] -= 0.5 * drag / data.hung_mass
-    return poles
-
-
-def held_transfers(
-    data: PlantData, s: ComplexArray, drag: float
-) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-    """Return P/Y, P/F, T/Y and T/F with the drum held: one spring, or the exact rope."""
-    return rope_transfers(data, s, drag, spring=data.lumping == "thesis")
-
-
-def locked_response(case: Case, omega: FloatArray, drag: float) -> ComplexArray:
-    """Return P/Z with the drum held at frequencies [rad/s], (k,), for a drag C [N s/m]."""
-    s = 1j * np.asarray(omega, dtype=np.complex128)
-    return held_transfers(PlantData.from_case(case), s, drag)[0]
 
 
 @lru_cache(maxsize=16)

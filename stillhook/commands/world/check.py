@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import math
 import shlex
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from ...text import (
@@ -29,8 +30,17 @@ from ..working import conclude
 if TYPE_CHECKING:
     from models import Case
     from models.hook import HookMotion
+    from synth.question import RopeFacts, SystemFacts, WaveBand
 
 Rows = list[tuple[str, str, str]]
+
+#: Where the period of a mode lies, by where its frequency does.
+_PLACES = {
+    "below": ("longer", "than the hook's band"),
+    "in": ("in", "the hook's band"),
+    "above": ("shorter", "than the hook's band"),
+}
+_DIGITS = 12  # of a case's hash that are shown
 
 ARGUMENTS = (CASE,)
 
@@ -38,25 +48,29 @@ ARGUMENTS = (CASE,)
 def run(arguments: argparse.Namespace) -> int:
     """Read the case and show what follows from it; return 0."""
     from models.hook import HookMotion
+    from synth.question import system_facts
 
     case = given_case(arguments)
     hook = HookMotion.from_case(case)
-    report = check_report(case, hook)
+    facts = system_facts(case, hook)
+    report = check_report(case, hook, facts)
     words = case_words(arguments)
     following = [("the gains for it", f"stillhook optimise {words}")]
     if case.gains is not None:
         following.append(("the gains in use", f"stillhook evaluate {words}"))
     sea = f"stillhook check {shlex.quote(arguments.case)} --set sea.significant_height=1.5"
     following.append(("another sea", sea))
-    return conclude(report, arguments, following=following)
+    result = {"digest": case.digest, "system": asdict(facts)}
+    return conclude(report, arguments, following=following, result=result)
 
 
-def check_report(case: Case, hook: HookMotion) -> Report:
+def check_report(case: Case, hook: HookMotion, facts: SystemFacts) -> Report:
     """Return what follows from a case, as tables of label, figure and remark."""
     tables = [
-        remarks("sea and hook", _sea(case, hook)),
-        remarks("rope and payload", _rope(case, hook)),
-        remarks("winch", _winch(case, hook)),
+        remarks("case", _case(case)),
+        remarks("sea and hook", _sea(case, hook, facts.waves)),
+        remarks("rope and payload", _rope(case, facts)),
+        remarks("winch", _winch(case, facts)),
         remarks("sensors and limits", _limits(case)),
     ]
     about = " ".join(case.description.split())
@@ -65,11 +79,19 @@ def check_report(case: Case, hook: HookMotion) -> Report:
     )
 
 
-def _sea(case: Case, hook: HookMotion) -> Rows:
+def _case(case: Case) -> Rows:
+    digits = case.digest
+    return [("hash", digits[:_DIGITS], f"of its contents: {_DIGITS} digits of {len(digits)}")]
+
+
+def _sea(case: Case, hook: HookMotion, waves: WaveBand) -> Rows:
     sea, statistics = case.sea, hook.sea.statistics
     moved, speed = hook.displacement, hook.velocity
     time = case.limits.exposure_time
     outside = hook.rao.share_outside(hook.sea).total
+    shortest, longest, most = (
+        quantity(2.0 * math.pi / omega, "s") for omega in (waves.high, waves.low, waves.peak)
+    )
     rows = [
         (
             "sea",
@@ -96,6 +118,9 @@ def _sea(case: Case, hook: HookMotion) -> Rows:
             f"largest in {duration(time)} {quantity(speed.most_probable_maximum(time), 'm/s')}",
         ),
     ]
+    if moved.rms > 0.0:
+        remark = f"of its variance from {shortest} to {longest}, peak {most}"
+        rows.append(("hook, band", "90 %", remark))
     if outside > 5e-4:
         remark = f"of the variance: below {case.vessel.below}, beyond {case.vessel.beyond}"
         rows.append(("outside the RAO's table", percent(outside), remark))
@@ -117,83 +142,96 @@ def _vessel(case: Case) -> Rows:
     ]
 
 
-def _rope(case: Case, hook: HookMotion) -> Rows:
-    from models.plant import PlantData
-    from synth.question import uncompensated
-
-    rope, payload = case.rope, case.payload
-    # Of the load's weight, and half the rope's own; of tip and slings by what hangs on them.
-    hung = payload.submerged_weight + case.rigging.block_weight
-    stretch = (hung + 0.5 * rope.submerged_weight) / rope.stiffness
-    stretch += case.hung_weight / case.crane.stiffness
-    stretch += payload.submerged_weight / case.rigging.sling_stiffness
-    drag, rms = uncompensated(case, PlantData.from_case(case), hook)
-    modes = _modes(case)
-    periods = [quantity(2.0 * math.pi / mode, "s") for mode in modes]
-    held = f"drum held; next {', '.join(periods[1:])}" if periods[1:] else "drum held, one spring"
+def _rope(case: Case, facts: SystemFacts) -> Rows:
+    rope, held = facts.rope, facts.held
+    first, *others = facts.modes
+    periods = ", ".join(quantity(mode.period, "s") for mode in others)
     of = "" if rope.falls == 1 else f", {rope.falls} falls"
-    masses = [f"payload {quantity(payload.mass, 'kg')}"]
-    masses += [f"added {quantity(payload.hydrodynamic_mass, 'kg')}"]
-    masses += [f"rope {quantity(rope.mass, 'kg')}"]
-    if case.rigging.block_mass:
-        masses += [f"hook block {quantity(case.rigging.block_mass, 'kg')}"]
-    moves = f"{number(rms / hook.displacement.rms)} times the hook's, with the drum held"
-    how = "fixed by the case" if payload.fixed_drag is not None else "with the drum held"
+    masses = [f"payload {quantity(rope.payload_mass, 'kg')}"]
+    masses += [f"added {quantity(rope.added_mass, 'kg')}"]
+    masses += [f"rope {quantity(rope.rope_mass, 'kg')}"]
+    if rope.block_mass:
+        masses += [f"hook block {quantity(rope.block_mass, 'kg')}"]
+    moves = "with the drum held"
+    if held.hook_rms > 0.0:
+        moves = f"{number(held.factor)} times the hook's, {moves}"
+    fixed = case.payload.fixed_drag is not None
     return [
-        ("stiffness K = EA/L", quantity(rope.stiffness, "N/m"), f"EA {quantity(rope.ea, 'N')}{of}"),
-        *_rig(case),
-        ("mass that moves, M", quantity(case.moving_mass, "kg"), ", ".join(masses)),
-        ("natural period", periods[0], held),
+        (
+            "stiffness K = EA/L",
+            quantity(rope.stiffness, "N/m"),
+            f"EA {quantity(rope.axial_stiffness, 'N')}{of}",
+        ),
+        *_rig(rope),
+        ("mass that moves, M", quantity(rope.moving_mass, "kg"), ", ".join(masses)),
+        (
+            "natural period",
+            quantity(first.period, "s"),
+            f"drum held; next {periods}" if periods else "drum held, one spring",
+        ),
+        *_among_waves(facts),
         (
             "stretch at rest",
-            quantity(stretch, "m"),
+            quantity(rope.stretch, "m"),
             f"axial waves need {quantity(rope.travel_time, 's')} end to end",
         ),
-        ("linear drag", quantity(drag, "N s/m"), how),
-        ("payload, rms", quantity(rms, "m"), moves)
-        if math.isfinite(rms)
+        (
+            "linear drag",
+            quantity(held.drag, "N s/m"),
+            "fixed by the case" if fixed else "with the drum held",
+        ),
+        ("payload, rms", quantity(held.payload_rms, "m"), moves)
+        if math.isfinite(held.payload_rms)
         else ("payload, rms", "-", "without bound with the drum held: nothing damps it"),
     ]
 
 
-def _winch(case: Case, hook: HookMotion) -> Rows:
-    from models.hook import HookDemand
+def _among_waves(facts: SystemFacts) -> Rows:
+    """Return where the natural periods lie among those of the hook."""
+    if facts.held.hook_rms == 0.0:
+        return []
+    first, *others = facts.modes
+    figure, remark = _PLACES[first.place]
+    remark += f", at {percent(first.relative_density)} of its peak"
+    if others:
+        remark += f"; next {', '.join(_PLACES[mode.place][0] for mode in others)}"
+    return [("... in the waves", figure, remark)]
 
-    winch, drive = case.winch, case.winch.drive
-    torque = case.static_torque_budget
-    mass = winch.inertia * (winch.gearbox.ratio / case.haul_radius) ** 2
-    rope_speed = winch.speed_limit * case.drum_radius / winch.gearbox.ratio
-    fastest = hook.velocity.most_probable_maximum(case.limits.exposure_time)
-    tension = case.limits.rope_tension_peak
-    allowed = (
-        "" if tension is None else f"{percent(case.static_tension_budget / tension)} of what it may"
-    )
-    least = case.least_tension
-    taut = "" if least is None else f"{quantity(least, 'N')} are to stay in the rope"
-    kind = "DC" if winch.motor.type == "dc" else "AC"
+
+def _winch(case: Case, facts: SystemFacts) -> Rows:
+    winch = facts.winch
+    share, stays = winch.tension_share, winch.tension_to_stay
+    kind = "DC" if case.winch.motor.type == "dc" else "AC"
     return [
-        ("drum radius", quantity(case.drum_radius, "m"), "to the rope's centre, rope paid out"),
-        ("static rope tension", quantity(case.static_tension_budget, "N"), allowed),
-        ("... at the load, least", quantity(case.payload.least_weight, "N"), taut),
+        ("drum radius", quantity(winch.drum_radius, "m"), "to the rope's centre, rope paid out"),
+        (
+            "static rope tension",
+            quantity(winch.drum_tension_hauling, "N"),
+            "" if share is None else f"{percent(share)} of what it may",
+        ),
+        (
+            "... at the load, least",
+            quantity(winch.load_tension_least, "N"),
+            "" if stays is None else f"{quantity(stays, 'N')} are to stay in the rope",
+        ),
         (
             "static motor torque",
-            quantity(torque, "N m"),
-            f"{percent(torque / drive.torque_continuous)} of the rating, "
-            f"{percent(torque / drive.torque_peak)} of the peak",
+            quantity(winch.static_torque, "N m"),
+            f"{percent(winch.rating_share)} of the rating, {percent(winch.peak_share)} of the peak",
         ),
         (
             "fastest rope",
-            quantity(rope_speed, "m/s"),
-            f"the hook's largest speed is {percent(fastest * case.rope.falls / rope_speed)} of it",
+            quantity(winch.rope_speed, "m/s"),
+            f"the hook's largest speed is {percent(winch.speed_share)} of it",
         ),
         (
             "inertia",
             quantity(winch.inertia, "kg m2"),
-            f"at the motor ({kind}); {quantity(mass, 'kg')} at the rope",
+            f"at the motor ({kind}); {quantity(winch.equivalent_mass, 'kg')} at the rope",
         ),
         (
             "power to follow the hook",
-            quantity(HookDemand.from_case(case).drive_power, "W"),
+            quantity(winch.following_power, "W"),
             "of the drive: static tension times that speed, with losses",
         ),
     ]
@@ -217,22 +255,16 @@ def _limits(case: Case) -> Rows:
     return rows
 
 
-def _modes(case: Case) -> list[float]:
-    """Return the natural frequencies with the drum held [rad/s]: the first three."""
-    from models.plant import PlantData
-
-    return [float(w) for w in PlantData.from_case(case).axial_modes(3)]
-
-
-def _rig(case: Case) -> Rows:
+def _rig(rope: RopeFacts) -> Rows:
     """Return what gives besides the rope, and all of it in series."""
-    crane, rigging = case.crane.tip_stiffness, case.rigging.stiffness
     rows = []
-    for name, stiffness in (("... crane's tip", crane), ("... slings", rigging)):
-        if stiffness is not None:
-            share = percent(case.chain_stiffness / stiffness)
-            rows.append((name, quantity(stiffness, "N/m"), f"{share} of the stretch"))
+    for name, stiffness, share in (
+        ("... crane's tip", rope.tip_stiffness, rope.tip_share),
+        ("... slings", rope.sling_stiffness, rope.sling_share),
+    ):
+        if math.isfinite(stiffness):
+            rows.append((name, quantity(stiffness, "N/m"), f"{percent(share)} of the stretch"))
     if rows:
         series = "tip, rope and slings, one below the other"
-        rows.append(("... in series", quantity(case.chain_stiffness, "N/m"), series))
+        rows.append(("... in series", quantity(rope.series_stiffness, "N/m"), series))
     return rows
