@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
     from .comparison import Comparison, compare, write_comparison
     from .designs import load_design, save_design, write_report
-    from .runs import Runs, simulate, write_runs
+    from .runs import FailureModes, Runs, failure_modes, simulate, write_runs
     from .seas import load_windows, save_windows
     from .sweeps import fault_spread, resume_sweep, sweep, usual_spread
 else:

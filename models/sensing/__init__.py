@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         ControllerAround,
         Measurement,
         Recursion,
+        heard_by,
         holds_brake,
         recursion_of,
     )

@@ -203,6 +203,17 @@ def recursion_of(controller: Controller) -> Recursion | None:
     return found if isinstance(found, Recursion) else None
 
 
+def heard_by(controller: Controller) -> frozenset[str]:
+    """Return which of `HEARD` a controller hears; one in Python may hear all of them."""
+    recursion = recursion_of(controller)
+    if recursion is None:
+        return frozenset(HEARD)
+    f = recursion.function
+    xc, m = ca.SX.sym("xc", f.numel_in(0)), ca.SX.sym("m", f.numel_in(1))
+    out = ca.vertcat(*f(xc, m))
+    return frozenset(name for i, name in enumerate(HEARD) if ca.depends_on(out, m[i]))
+
+
 def holds_brake(controller: Controller) -> bool:
     """Return whether the controller holds the drum with its brake."""
     return bool(getattr(controller, "brake", False))

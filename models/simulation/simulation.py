@@ -129,6 +129,26 @@ class Simulation:
         """Return it with other options of its runs: those of the plant were used to prepare it."""
         return replace(self, options=replace(self.options, **changes))
 
+    def serves(self, scenario: Scenario) -> bool:
+        """Return whether another scenario has the same loop, and need not be prepared anew.
+
+        Set-points, the brake, the drive's limits and what is lost come in with the rows; another
+        plant, a link that is later and another interface of the operator do not.
+        """
+        late = scenario.telemetry_delays
+        sensors = SensorModel.from_case(self.case, self.loop.sample_time, late)
+        return sensors.lags == self.sensors.lags and _looped(scenario) == _looped(self.scenario)
+
+    def with_scenario(self, scenario: Scenario) -> Simulation:
+        """Return it with another scenario that it serves.
+
+        Raises InputError if that needs a loop of its own.
+        """
+        if not self.serves(scenario):
+            raise InputError(f"scenario {scenario.name}: needs a simulation of its own: prepare it")
+        schedule = Schedule(scenario=scenario, sample_time=self.loop.sample_time)
+        return replace(self, scenario=scenario, schedule=schedule)
+
     def with_trip(self, whole: Run | None) -> Simulation:
         """Return it with the scenario's `worst_trip` at its moment in the run without, whole.
 
@@ -144,8 +164,7 @@ class Simulation:
                 trips = (*trips, (at, at + lasting))
         scenario = replace(self.scenario, worst_trip=None, brake_trips=trips)
         step = self.options.store_step if whole is not None else self.loop.sample_time
-        schedule = Schedule(scenario=scenario, sample_time=self.loop.sample_time)
-        return replace(self.with_options(store_step=step), scenario=scenario, schedule=schedule)
+        return self.with_options(store_step=step).with_scenario(scenario)
 
     def rows(self, seed: int, duration: float) -> RowMaker:
         """Return what makes the rows of one run of a duration [s]."""
@@ -273,9 +292,7 @@ def prepare(
         data, least = PlantData.from_case(case), int(getattr(controller, "masses", 0))
         masses = least if data.masses is None and least > data.chosen_masses() else None
     surroundings = scenario.surroundings
-    farthest = max((abs(move.distance) for move in scenario.profile.moves), default=0.0)
-    travels = max(farthest, abs(scenario.initial_haul)) > _TRAVELS
-    travel = DrumTravel.from_case(case) if travels else None
+    travel = DrumTravel.from_case(case) if _travels(scenario) else None
     plant = build_plant(case, masses, limits=limits, travel=travel, surroundings=surroundings)
     rest = _rest(case, masses, surroundings)  # without limits, which rest must not depend on
     values = _parameters(case, plant, options.parameters or {})
@@ -305,6 +322,25 @@ def prepare(
         sensors=sensors,
         schedule=Schedule(scenario=scenario, sample_time=sample_time),
         rest=rest,
+    )
+
+
+def _travels(scenario: Scenario) -> bool:
+    """Return whether the drum takes up so much rope that its radius and the rope change."""
+    farthest = max((abs(move.distance) for move in scenario.profile.moves), default=0.0)
+    return max(farthest, abs(scenario.initial_haul)) > _TRAVELS
+
+
+def _looped(scenario: Scenario) -> tuple[object, ...]:
+    """Return what of a scenario is part of the loop itself, or of the state that it starts from."""
+    interface = (scenario.rate, scenario.ramp) if scenario.operated else None
+    return (
+        dict(scenario.case_changes),
+        scenario.surroundings,
+        scenario.touch_down,
+        scenario.initial_haul,
+        _travels(scenario),
+        interface,
     )
 
 

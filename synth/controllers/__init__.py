@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from .brake import BrakeOn
     from .constant_tension import ConstantTension
     from .feed_forward import VelocityFeedForward
-    from .interface import operated
-    from .linear_feedback import LinearFeedback
+    from .interface import STOPPING, operated
+    from .linear_feedback import FADE, LinearFeedback
     from .touch_down import touching_down
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

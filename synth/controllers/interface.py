@@ -52,6 +52,7 @@ from models.sensing import (
     ControllerAround,
     Measurement,
     Recursion,
+    heard_by,
     holds_brake,
     recursion_of,
 )
@@ -125,7 +126,7 @@ def operated(
     limits, motor = DriveLimits.from_case(case), loop.motor
     peak = min(limits.torque, motor.torque_constant * limits.current)
     most = peak / motor.torque_gain + motor.own_gain * limits.speed
-    hears = frozenset(HEARD) if recursion is None else _heard(recursion)
+    hears = heard_by(controller)
     deaf = case.sensors.telemetry.delay + 1.0 if hears & set(_MOVES) else math.inf
     if recursion is None and hasattr(controller, "status"):  # which knows it itself
         deaf = math.inf
@@ -284,9 +285,12 @@ class _Interface:
         place = ca.if_else(begins, haul, place + ca.if_else(was_on, haul - there, 0.0))
         integral = ca.if_else(begins, applied - loop.static - loop.motor.feed * speed, integral)
         rope_speed = speed / loop.motor.per_rope_speed
+        # A drum that nobody sees is taken to do as asked: held against the haul that was seen last,
+        # or a speed of then, it would run away.
+        off, now = ca.if_else(turns, place - haul, 0.0), ca.if_else(turns, now, speed)
         drum, hold = loop.command(
             ca.vertcat(integral, ca.if_else(begins, applied, held)),
-            rope_speed + _TRIM * loop.bandwidth * (place - haul),
+            rope_speed + _TRIM * loop.bandwidth * off,
             {"motor.speed": now, "drive.applied": applied},
         )
         since = ca.if_else(was_on, ca.fmin(1.0, since + self._more), 0.0)
@@ -342,14 +346,6 @@ class _Interface:
         if self.hears & {"mru.heave", "mru.heave_rate"}:
             moves = moves + ca.vertcat(m["mru.heave"], m["mru.heave_rate"], 0.0)
         return moves
-
-
-def _heard(recursion: Recursion) -> frozenset[str]:
-    """Return the names of what a law hears."""
-    f = recursion.function
-    xc, m = ca.SX.sym("xc", f.numel_in(0)), ca.SX.sym("m", f.numel_in(1))
-    out = ca.vertcat(*f(xc, m))
-    return frozenset(name for i, name in enumerate(HEARD) if ca.depends_on(out, m[i]))
 
 
 def _holds(status: ca.SX) -> ca.SX:

@@ -17,12 +17,12 @@ from one_run import simulate
 from still_motion import StillMotion
 
 from models import Case, InputError, PhysicsWarning, build_plant
-from models.operation import Scenario, SineMotion, scenario_named
+from models.operation import Scenario, SineMotion, scenario_named, with_faults
 from models.operation.profile import Move, Profile
 from models.plant import MEASUREMENTS, DriveLimits, PlantData
 from models.run import Run
 from models.sensing import HEARD, Measurement, SensorModel, sensed_plant
-from models.simulation import Simulation, prepare, run_simulation
+from models.simulation import Simulation, SimulationOptions, prepare, run_simulation
 from models.simulation.trips import trip_limits
 from synth.controllers import BrakeOn, LinearFeedback
 from synth.loop import closed_loop_poles
@@ -677,3 +677,43 @@ def test_energy_is_neither_made_nor_lost_by_a_swinging_load() -> None:
     first = np.abs(swing[(run.time > 20.0) & (run.time < 60.0)]).max()
     last = np.abs(swing[run.time > 460.0]).max()
     assert last == pytest.approx(first, rel=1e-4)
+
+
+def test_a_loop_serves_every_scenario_that_comes_in_with_its_rows() -> None:
+    case = crane(**CALM)
+    made = prepare(case, feedback(case, CRANE, 0.02), "hold", SimulationOptions(duration=60.0))
+    sizes = {
+        "fault.telemetry_outage": 5.0,
+        "fault.mru_heave_bias": 0.1,
+        "fault.torque_limit": 0.8,
+        "fault.power_limit": 0.8,
+        "fault.brake_trip": 10.0,
+    }
+    failing = with_faults(made.scenario, {"fault.at": 40.0, **sizes}, case, 60.0)
+    assert made.serves(failing)
+    served = run_simulation(made.with_scenario(failing), seed=2)
+    own = prepare(case, made.controller, failing, SimulationOptions(duration=60.0))
+    anew = run_simulation(own, seed=2)
+    assert (served.values == anew.values).all()
+    assert [str(event) for event in served.events] == [str(event) for event in anew.events]
+    assert (served.values != run_simulation(made, seed=2).values).any()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"telemetry_delays": ((40.0, 50.0, 0.1),)},
+        {"encoder_outages": ((40.0, 50.0),)},
+        {"enabled": ((10.0, 50.0),)},
+        {"case_changes": {"rope.length": 900.0}},
+        {"initial_haul": 0.5},
+        {"profile": Profile(moves=(Move(start=5.0, distance=3.0, speed=0.5, acceleration=0.5),))},
+    ],
+)
+def test_a_loop_does_not_serve_another_plant_link_or_interface(changes) -> None:
+    case = crane(**CALM)
+    made = prepare(case, feedback(case, CRANE, 0.02), "hold", SimulationOptions(duration=60.0))
+    other = replace(made.scenario, name="other", **changes)
+    assert not made.serves(other)
+    with pytest.raises(InputError, match="scenario other: needs a simulation of its own"):
+        made.with_scenario(other)

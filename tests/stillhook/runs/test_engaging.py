@@ -134,6 +134,22 @@ def test_without_encoder_the_drum_is_stopped_within_a_second_and_braked(kind, se
     assert run.timings.statuses["stopping"] == pytest.approx(1.0 / run.sample_time, abs=2.0)
 
 
+@pytest.mark.parametrize("name", ["thesis-1975", "subsea-crane"])
+def test_a_drum_that_nobody_sees_is_not_driven_on(name) -> None:
+    """Held against its last haul it was, by feedback every 5 ms: to 89 rad/s from 18."""
+    case = load_case(name).replace({"sea.significant_height": 0.5})
+    gains = {"A": 1.0, "a": 10000.0, "a1": 20000.0, "a2": 20000.0}
+    controller = sh.LinearFeedback(case, gains) if name == "thesis-1975" else "feed-forward"
+    lost = {"lost": "encoder", "wait": ON}
+    run = sh.simulate(
+        case, controller, scenario="sensor-loss", options=lost, duration=ON + 3.0, store_step=0.02
+    )[0]
+    speed = np.abs(over(run, "motor.speed", ON - 0.02, ON + 1.0))
+    assert speed[0] > 3.0
+    assert speed.max() < 1.15 * speed[0]
+    assert speed[-1] < 0.1 * speed[0]
+
+
 def test_without_load_cell_constant_tension_holds_the_drum_and_mpc_goes_on() -> None:
     moved = {}
     for kind in ("constant-tension", "mpc"):

@@ -16,7 +16,15 @@ from hypothesis import strategies as st
 
 from models.basics import InputError
 from models.plant import MEAN_LOSSES, build_plant
-from models.sensing import HEARD, Controller, Measurement, Recursion, holds_brake, recursion_of
+from models.sensing import (
+    HEARD,
+    Controller,
+    Measurement,
+    Recursion,
+    heard_by,
+    holds_brake,
+    recursion_of,
+)
 from models.simulation import Kernel
 from synth.controllers import (
     BrakeOn,
@@ -248,3 +256,39 @@ def test_a_plain_object_with_reset_and_step_is_a_controller() -> None:
     assert isinstance(own, Controller)
     assert recursion_of(own) is None
     assert not holds_brake(own)
+
+
+@every
+def test_what_a_law_hears_is_what_its_command_hangs_on(name: str, kind: str) -> None:
+    heard, law = heard_by(made(name, kind)), made(name, kind)
+    told = {
+        "feedback": {"payload.acceleration", "payload.velocity", "payload.displacement"},
+        "feed-forward": {"mru.heave", "mru.heave_rate", "drum.haul"},
+        "constant-tension": {"rope.tension", "drum.haul"},
+        "none": set(),
+    }
+    family = next(k for k in told if kind.startswith(k))
+    assert told[family] <= heard
+    assert bool(heard) == bool(told[family])
+    for other in ("payload.velocity", "mru.heave_rate", "rope.tension"):
+        if other not in heard:
+            rows = seen_things(name, 40, seed=5)
+            changed = [row.values.copy() for row in rows]
+            for values in changed:
+                values[HEARD.index(other)] += 1.0
+            law.reset()
+            before = [law.step(row, 0.0) for row in rows]
+            law.reset()
+            assert [law.step(Measurement(values), 0.0) for values in changed] == before
+
+
+def test_a_controller_in_python_may_hear_everything() -> None:
+    class Own:
+        name, sample_time = "own", 0.05
+
+        def reset(self) -> None: ...
+
+        def step(self, measurement: Measurement, time: float) -> float:
+            return 0.0
+
+    assert heard_by(Own()) == frozenset(HEARD)
