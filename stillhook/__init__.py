@@ -57,7 +57,8 @@ if TYPE_CHECKING:
     from synth.sizing import co_design, pareto_front, size_winch, worth
 
     from .comparison import Comparison, compare, write_comparison
-    from .designs import load_design, save_design, write_report
+    from .designs import load_design, save_design, write_design
+    from .report import Revision, TitleBlock, write_report
     from .runs import FailureModes, Runs, failure_modes, simulate, write_runs
     from .seas import load_windows, save_windows
     from .sweeps import fault_spread, resume_sweep, sweep, usual_spread

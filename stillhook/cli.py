@@ -61,6 +61,7 @@ COMMANDS = (
         "study",
         "try a design or a controller on many cases: what is not known exactly, what fails",
     ),
+    ("report", "study", "write all there is about a design as a report for clients: HTML and PDF"),
     ("scenarios", "run", "list the operations and the controllers"),
     ("bound", "design", "say what no linear controller can do better than"),
     ("sea", "world", "read wave spectra: what they hold, scatter diagram, one of them"),

@@ -173,6 +173,23 @@ DESIGN = options(
         best ones are found
     """
 )
+#: How still the payload must be; `REQUIRED` are its names.
+STILLNESS = options(
+    """
+    how still the payload must be:
+    --payload-rms LENGTH  standard deviation of its motion, as in '50 mm'
+    --payload-significant LENGTH  significant double amplitude, 4 sigma
+    --payload-max LENGTH  most probable maximum amplitude in the case's exposure time
+    --payload-speed SPEED  most probable maximum of its speed, as in '0.5 m/s'
+    --daf RATIO  largest dynamic amplification factor at the load's end of the rope, as in 1.3
+    --snap SHARE  largest share of the load's weight that the dynamic tension there may take up
+        before the rope is slack and snaps taut, as in 0.9
+    """,
+    daf=within(low=1.0, high=10.0, open_low=True),
+)
+REQUIRED = (
+    "payload_rms", "payload_significant", "payload_max", "payload_speed", "daf", "snap"
+)  # fmt: skip
 NO_BOUND = options(
     """
     --no-bound  do not compare with the best that any linear controller could do (2 s each, 15 s

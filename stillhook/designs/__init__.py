@@ -12,11 +12,24 @@ if TYPE_CHECKING:
     from .bound_text import bound_rows
     from .design_file import design_data, design_text, load_design, save_design
     from .kept_design import best_design, keep_best
-    from .report import design_report, write_report
+    from .motion import MotionView
+    from .report import design_report, write_design
     from .robust import robust_report, scenario_table, schedule_report
     from .sensitivity import Wide, indices_table, moved_table, sensitivity_report
     from .sizing import co_design_report, pareto_report, size_report, worth_report
     from .structures import structures_report, structures_table
-    from .summary import AT_LEAST, LIMITS
+    from .summary import (
+        AT_LEAST,
+        LIMITS,
+        about_of,
+        alternatives_table,
+        command_of,
+        command_text,
+        expected_table,
+        has_loop,
+        heard,
+        label_of,
+        share_table,
+    )
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

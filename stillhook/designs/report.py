@@ -84,7 +84,7 @@ def design_report(design: Design, *, bound: bool = True) -> Report:
     )
 
 
-def write_report(
+def write_design(
     folder: str | Path | OutputFolder,
     *,
     design: Design,

@@ -112,7 +112,10 @@ def alternatives_table(design: Design) -> Table | None:
     tried = sorted((design, *design.alternatives), key=lambda d: -d.family_rms)
     return Table(
         columns=columns("structure; payload_rms=payload [m]; residual=of the hook's [%]; hears <"),
-        rows=[(d.structure, d.family_rms, d.family_rms / d.hook_rms, _hears(d)) for d in tried],
+        rows=[
+            (d.structure, d.family_rms, d.family_rms / d.hook_rms, ", ".join(heard(d)))
+            for d in tried
+        ],
         notes=(
             *(f"{d.structure}: {_why_not(design, d)}" for d in tried if d is not design),
             *unit_notes(tried),
@@ -137,10 +140,10 @@ def unit_notes(designs: Sequence[Design]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _hears(design: Design) -> str:
+def heard(design: Design) -> tuple[str, ...]:
     """Return the instruments that a structure hears."""
-    heard = {name.partition(".")[0] for name in design.measurements}
-    return ", ".join(said for said, parts in _INSTRUMENTS.items() if heard & parts)
+    found = {name.partition(".")[0] for name in design.measurements}
+    return tuple(said for said, parts in _INSTRUMENTS.items() if found & parts)
 
 
 def _why_not(taken: Design, other: Design) -> str:
@@ -200,16 +203,21 @@ def parameter_table(design: Design) -> Table:
     return Table(columns=heads, rows=rows, notes=tuple(notes))
 
 
+def command_of(design: Design) -> str:
+    """Return what the structure commands, with its unit."""
+    motor = design.case.winch.motor
+    if isinstance(motor, DCMotor):
+        return "armature voltage [V]"
+    return "motor speed [rad/s]" if motor.speed_gain else "motor torque [N m]"
+
+
 def command_text(design: Design) -> str:
     """Return what the structure commands, for payload feedback its law."""
-    motor = design.case.winch.motor
-    command = "motor speed [rad/s]" if getattr(motor, "speed_gain", 0.0) else "motor torque [N m]"
-    if isinstance(motor, DCMotor):
-        command = "armature voltage [V]"
+    command = command_of(design)
     if design.structure == "payload-feedback":
         return f"{command} = -A (a P'' + a1 P' + a2 P)"
-    heard = ", ".join(name.replace(".", " ").replace("_", " ") for name in design.measurements)
-    return f"{command} by {heard}"
+    names = ", ".join(name.replace(".", " ").replace("_", " ") for name in design.measurements)
+    return f"{command} by {names}"
 
 
 def share_table(design: Design) -> Table | None:

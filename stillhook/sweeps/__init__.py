@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .figures import sweep_figures
+    from .figures import cumulative_share, sweep_figures, violins
     from .report import place_of, sweep_data, sweep_report, write_sweep
     from .store import stored_question
     from .sweeping import resume_sweep, spread_of, sweep

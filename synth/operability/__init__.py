@@ -12,6 +12,7 @@ from models.basics.lazy import lazy_face
 if TYPE_CHECKING:
     from .alpha import Alpha, alpha_factor
     from .contour import Contour
+    from .criteria import payload_criteria
     from .depths import AtDepth
     from .recheck import ContourCheck
     from .record_limits import VesselHeading

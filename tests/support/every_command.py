@@ -24,6 +24,8 @@ LINES = (
     "sweep thesis-1975 --samples 16",
     "sweep thesis-1975 --mode time --samples 2 --duration '20 s' --jobs 2 --out out/time",
     "sweep thesis-1975 --mode time --samples 2 --duration '20 s' --cluster local:1 --out out/dask",
+    "report thesis-1975 --without comparison,operability,robustness,sweep,failures,simulation "
+    "--no-bound",
     "scenarios",
     "bound thesis-1975",
     "sea thesis-1975",

@@ -18,13 +18,13 @@ ARGUMENTS = (
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate, show and (if asked) save; return 0 if the design is ok, 1 if not."""
     case = given_case(arguments)
-    from ...designs import design_data, design_report, write_report
+    from ...designs import design_data, design_report, write_design
 
     folder = None if arguments.out is None else prepared(arguments, case.name)
     design = given_design(case, arguments)
     with working(arguments) as tell:
         if folder is not None:
-            write_report(folder, design=design, bound=arguments.bound, progress=tell)
+            write_design(folder, design=design, bound=arguments.bound, progress=tell)
     structure = "" if design.gains else f" --structure {design.structure}"
     again = [
         ("the best for this case", f"stillhook optimise {case_words(arguments, folder)}{structure}")

@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder.write("case.yaml", case.to_yaml())
     from synth import optimise_gains
 
-    from ...designs import design_data, design_report, keep_best, write_report
+    from ...designs import design_data, design_report, keep_best, write_design
 
     one = asked[0] if asked is not None and len(asked) == 1 else asked
     design: Design | None = None
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
             plain = not members and not fixed and (arguments.starts, arguments.seed) == (16, 0)
             if plain and (one is None or isinstance(one, str)):
                 keep_best(design, case, one)
-            write_report(folder, design=design, bound=arguments.bound, progress=tell)
+            write_design(folder, design=design, bound=arguments.bound, progress=tell)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(_kept(folder, design)) from None
     report = design_report(design, bound=arguments.bound and not arguments.quiet)

@@ -65,7 +65,7 @@ def names(folder) -> set[str]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report") / "deep" / "out"
-    written = sh.write_report(folder, design=thesis_design())
+    written = sh.write_design(folder, design=thesis_design())
     return folder, written
 
 
@@ -118,7 +118,7 @@ def test_an_unstable_design_takes_figures_of_an_earlier_run_away(tmp_path):
     for name in ("limits.svg", "limits.png", "notes.txt"):
         (tmp_path / name).touch()
     (tmp_path / LIST).write_text("limits.svg\nlimits.png\n")
-    written = sh.write_report(tmp_path, design=unstable_design())
+    written = sh.write_design(tmp_path, design=unstable_design())
     assert names(tmp_path) == ALL - {"limits.svg", "limits.png"} | {"notes.txt"}
     assert len(written) == len(ALL) - 2
     text = (tmp_path / "summary.md").read_text(encoding="utf-8")
@@ -144,7 +144,7 @@ def test_an_infeasible_design_says_what_it_would_take():
 @pytest.mark.usefixtures("quick_pictures")
 def test_progress_is_told(tmp_path):
     told = []
-    sh.write_report(tmp_path, design=loopless_design(), progress=lambda *step: told.append(step))
+    sh.write_design(tmp_path, design=loopless_design(), progress=lambda *step: told.append(step))
     assert told == [("figures", done, 2) for done in range(2)]  # there is no loop to draw
 
 
@@ -153,13 +153,13 @@ def test_a_file_in_the_way_of_the_folder_is_named(below, tmp_path):
     (tmp_path / "out").touch()
     reason = "part of the path is a file" if below else "a file is there"
     with pytest.raises(InputError, match=f"the output folder cannot be made: {reason}$"):
-        sh.write_report(f"{tmp_path}/out/{below}", design=thesis_design())
+        sh.write_design(f"{tmp_path}/out/{below}", design=thesis_design())
 
 
 @pytest.mark.usefixtures("quick_pictures")
 def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch):
     folder = tmp_path / "out"
-    sh.write_report(folder, design=loopless_design())
+    sh.write_design(folder, design=loopless_design())
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     (folder / "summary.md").write_text("old")
     from pathlib import Path
@@ -174,7 +174,7 @@ def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match=r"summary\.md: cannot be written: No space left on dev"):
-        sh.write_report(folder, design=loopless_design())
+        sh.write_design(folder, design=loopless_design())
     after = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert after == before | {"summary.md": b"old"}
 
