@@ -162,7 +162,8 @@ class _Pages:
 
     def table(self, table: Table) -> dict[str, Any]:
         # In the order of `figures_of`: title, headings, cells, notes.
-        title = self.words(table.title)
+        named = [column.heading for column in table.columns]
+        title = [] if str(table.title) in named else self.words(table.title)
         heads = []
         for k, column in enumerate(table.columns):
             label = column.label if isinstance(column.label, Written) else column.heading

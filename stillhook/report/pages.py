@@ -9,6 +9,7 @@ things.  Neither asks for anything from anywhere: figures are inside, with the g
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from importlib.util import find_spec
@@ -20,6 +21,8 @@ from models.basics import StillhookError
 from ..text import characters_of, font_face
 
 _HERE = Path(__file__).parent
+_LONG = re.compile(r"([a-z][._/](?=[a-z])|[0-9a-f]{16}(?=[0-9a-f]))")
+"""Where long names and hashes may break."""
 
 
 def html_text(pages: Mapping[str, Any]) -> str:
@@ -61,7 +64,7 @@ def pdf_bytes(pages: Mapping[str, Any]) -> bytes:
             (_HERE / "report.typ").read_bytes(),
             font_paths=[str(fonts)],
             ignore_system_fonts=True,
-            sys_inputs={"document": json.dumps(pages, ensure_ascii=False)},
+            sys_inputs={"document": json.dumps(_breakable(pages), ensure_ascii=False)},
             timestamp=0,
         )
     except RuntimeError as error:
@@ -75,3 +78,14 @@ def _figures(parts: Any) -> Iterator[str]:
             yield part["svg"]
         elif part["kind"] == "section":
             yield from _figures(part["items"])
+
+
+def _breakable(part: Any, name: str = "") -> Any:
+    """Return pages whose long words may break at the end of a line; HTML lets them by itself."""
+    if isinstance(part, dict) and part.get("kind") == "listing":
+        return part  # to be copied
+    if isinstance(part, dict):
+        return {key: _breakable(item, key) for key, item in part.items()}
+    if isinstance(part, list):
+        return [_breakable(item, name) for item in part]
+    return _LONG.sub("\\1\u200b", part) if name in ("text", "origin") else part

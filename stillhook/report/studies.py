@@ -15,9 +15,11 @@ from ..text import (
     Report,
     ReportSection,
     Table,
+    Written,
     columns,
     count,
     duration,
+    number,
 )
 from .data import Told
 from .findings import Findings
@@ -104,6 +106,7 @@ def alternatives(s: Sources, told: Told) -> ReportSection:
     return chapter("Alternatives", *parts)
 
 
+_KWH = 3.6e6  # [J]
 #: What is told of energy and heat: label, quantity of the runs, unit.
 _ENERGY = (
     ("mean power", "motor power mean", "W"),
@@ -133,7 +136,7 @@ def energy(s: Sources) -> ReportSection:
                 between = s.say(
                     "{} to {}", s.cite(f"{place}/low", unit), s.cite(f"{place}/high", unit)
                 )
-            rows.append((label, s.cite(f"{place}/value", unit), between))
+            rows.append((label, _spent(s, f"{place}/value", unit), between))
     runs = s.say(
         "Mean over {} of {} each in the case's own sea, with the intervals of that mean.",
         s.cite(f"{at}/shares/lost lock/total", write=lambda n: f"{n} run{'s' * (n != 1)}")
@@ -145,15 +148,21 @@ def energy(s: Sources) -> ReportSection:
     return chapter("Energy and heat", runs, table)
 
 
+def _spent(s: Sources, place: str, unit: str) -> Written:
+    if unit == "J/h":
+        return s.cite(place, unit, write=lambda value: f"{number(value / _KWH)} kWh/h")
+    return s.cite(place, unit)
+
+
 def failures(s: Sources, told: Told) -> ReportSection:
     """Return what the load does when something fails: in the first seconds, and after."""
     if "sheet" not in told.tables:
         return not_part("Failure modes", "failures were not simulated")
     at = f"{RESULTS}/failures"
     words = s.say(
-        "One thing at a time fails for {}, in {} of the case's own sea, at the moment at which the "
-        "drum turns fastest. Undisturbed the load moves {} rms and {} at most, with the drum "
-        "held {} and {}.",
+        "With the design at work one thing at a time fails for {}, in {} of the case's own sea, at "
+        "the moment at which the drum turns fastest. Undisturbed the load moves {} rms and {} at "
+        "most, with the drum held {} and {}.",
         s.cite(f"{at}/lasting", "s", write=duration),
         s.cite(f"{at}/seeds", write=lambda seeds: count(len(seeds), "seed")),
         *(

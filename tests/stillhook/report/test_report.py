@@ -349,6 +349,47 @@ def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch):
     assert contents(folder)["report.html"] == before["report.html"]
 
 
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("gains", "said"),
+    [
+        ({"a": -5, "a1": -10, "a2": -10}, "There is no stable loop"),
+        ({"a": 0, "a1": 0, "a2": 0}, "The design is NOT ok"),
+    ],
+)
+def test_a_design_that_is_none_has_a_report_that_says_so(tmp_path, gains, said):
+    sh.write_report(tmp_path, design=sh.evaluate_gains(sh.load_case(CASE), gains))
+    page = Page((tmp_path / "report.html").read_text())
+    assert said in " ".join(page.words)
+    assert "NOT ok" in page.words
+
+
+@pytest.mark.ci
+@pytest.mark.usefixtures("quick")
+def test_a_controller_of_many_states_stands_in_the_data(tmp_path):
+    design = sh.optimise_gains(sh.load_case(CASE), "high-order", starts=1)
+    sh.write_report(tmp_path, design=design, bound=False)
+    told = json.loads((tmp_path / "report.json").read_text())["results"]["controller"]
+    assert told["states"] > 12
+    assert len(told["continuous"]) == told["states"] + 1
+    assert "its matrices stand in report.json" in " ".join(
+        Page((tmp_path / "report.html").read_text()).words
+    )
+    assert (tmp_path / "report.pdf").exists()
+
+
+def test_long_names_may_break_in_the_pdf_and_numbers_may_not():
+    from stillhook.report.pages import _breakable
+
+    part = {"kind": "words", "parts": [{"text": f"rope.length 1.25 {'0123456789abcdef' * 2}"}]}
+    (found,) = _breakable(part)["parts"]
+    assert found["text"].split("\u200b") == [
+        "rope.", "length 1.25 0123456789abcdef", "0123456789abcdef"
+    ]  # fmt: skip
+    listing = {"kind": "listing", "text": "rope.length"}
+    assert _breakable(listing) == listing
+
+
 def test_studies_of_another_case_are_refused(tmp_path):
     design, other = design_of(CASE), design_of(CASE, **{"rope.length": 1500.0})
     study = sh.sweep(other, samples=4)
