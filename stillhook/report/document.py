@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,8 @@ from ..text import (
     Sentence,
     Table,
     Written,
+    csv_text,
+    folder_name,
     inline_svg,
     json_data,
 )
@@ -43,7 +45,9 @@ from .studies import (
 )
 from .wording import CASE, DESIGN, OWN
 
+_LONG = 40  # characters of a cell from which on its column shares the room that is left
 FORMAT = 1  #: Version of the format of `report.json`.
+TABLES = "tables"  #: Folder of the tables in a report's own.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,6 +98,16 @@ class Document:
         return cls(sources=s, report=report, design_text=told.design_text)
 
     @property
+    def tables(self) -> dict[str, str]:
+        """The tables as CSV in SI units, by the names of their files."""
+        found = {}
+        for number, chapter in enumerate(self.report.sections, 1):
+            name = folder_name(str(chapter.title).lower())
+            for k, table in enumerate(_tables(chapter), 1):
+                found[f"{TABLES}/{number:02d}-{name}-{k}.csv"] = csv_text(table)
+        return found
+
+    @property
     def data(self) -> dict[str, Any]:
         """What `report.json` holds: every result, and every figure with the place it came from."""
         own: Mapping[str, Any] = self.sources.files[OWN]
@@ -124,6 +138,14 @@ class Document:
         verdict = {"ok": self.report.ok, "status": self.report.status}
         block = self.sources.value(f"{OWN}#/results/identification")
         return {**head, **verdict, "block": block, "chapters": chapters}
+
+
+def _tables(section: ReportSection) -> Iterator[Table]:
+    for item in section.items:
+        if isinstance(item, ReportSection):
+            yield from _tables(item)
+        elif isinstance(item, Table):
+            yield item
 
 
 class _Pages:
@@ -179,6 +201,7 @@ class _Pages:
             "title": title,
             "heads": [] if bare else heads,
             "left": [head["left"] for head in heads],
+            "weights": _weights(table),
             "rows": rows,
             "notes": notes,
             "origin": origin(table),
@@ -204,6 +227,18 @@ class _Pages:
             elif text:
                 parts.append({"text": text})
         return _whole(parts) if whole else parts
+
+
+def _weights(table: Table) -> list[int]:
+    """Return how much room each column of long texts wants beside others; 0 for a column of none.
+
+    Twice as long a text in a column twice as wide is as high: the roots of lengths keep them even.
+    """
+    every = [
+        max((len(column.text(row[k])) for row in table.rows), default=0)
+        for k, column in enumerate(table.columns)
+    ]
+    return [round(math.sqrt(longest)) if longest > _LONG else 0 for longest in every]
 
 
 def _whole(parts: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -415,7 +415,7 @@ _FACTS: tuple[tuple[str, str, tuple[tuple[str, str, str], ...]], ...] = (
             ("mass of the hook block", "block_mass", "kg"),
             ("mass of the rope", "rope_mass", "kg"),
             ("mass that moves, M", "moving_mass", "kg"),
-            ("stretch at rest", "stretch", "m"),
+            ("stretch at rest, which set-down gives back", "stretch", "m"),
             ("of it the rope's", "rope_stretch", "m"),
             ("travel time of an axial wave, end to end", "travel_time", "s"),
         ),

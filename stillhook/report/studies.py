@@ -225,8 +225,8 @@ def appendix(s: Sources, told: Told) -> ReportSection:
     return chapter(
         "Appendix",
         "The files that figures are read from lie beside this document: case.yaml and design.yaml "
-        "load again in Stillhook, and report.json holds every figure with the file and the field "
-        "that it came from.",
+        "load again in Stillhook, report.json holds every figure with the file and the field that "
+        "it came from, and the folder tables each table as CSV, by chapter.",
         Listing(CASE, told.findings.case.to_yaml()),
         Listing(f"{DESIGN}, its first part", brief),
     )

@@ -17,7 +17,7 @@ from synth.design import Design
 from ..comparison import Comparison
 from ..runs import FailureModes, Runs
 from ..text import OutputFolder, Progress, json_text
-from .document import Document
+from .document import TABLES, Document
 from .findings import Findings, TitleBlock, requirement_of, told
 from .pages import can_typeset, html_text, pdf_bytes
 from .wording import CASE, DESIGN, OWN
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from synth.sensitivity import Sensitivity
 
 HTML, PDF = "report.html", "report.pdf"
-FILES = (HTML, PDF, OWN, CASE, DESIGN)  #: Files of a report.
 NO_PDF = "report.pdf was not made: it needs typst: run `make report`; report.html prints on A4 too"
 
 
@@ -85,8 +84,9 @@ def write_report(
     Returns
     -------
     list of Path
-        The files written: ``report.html``, ``report.json``, ``case.yaml``, ``design.yaml`` and,
-        where Typst is installed, ``report.pdf``; a PDF of an earlier run is removed elsewhere.
+        The files written: ``report.html``, ``report.json``, ``case.yaml``, ``design.yaml``, the
+        tables as CSV in ``tables`` and, where Typst is installed, ``report.pdf``; a PDF or a table
+        that only an earlier run had is removed.
 
     Raises
     ------
@@ -123,10 +123,11 @@ def write_report(
         (OWN, json_text(document.data)),
         (HTML, html_text(pages)),
     ]
+    made += document.tables.items()
     if can_typeset():
         made.append((PDF, pdf_bytes(pages)))
     written = [target.write(name, content) for name, content in made]
-    target.discard(PDF)
+    target.discard(PDF, f"{TABLES}/*.csv")
     return written
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import re
@@ -100,7 +101,12 @@ def small_report() -> dict[str, bytes]:
             ),
             block=BLOCK,
         )
-        return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+        return contents(Path(folder))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    every = (path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in every}
 
 
 def _seas():
@@ -255,6 +261,21 @@ def test_both_forms_of_the_controller_are_the_one_that_is_simulated(sources):
     assert [one["name"] for one in told["signals"]] == list(law.controller.measurements)
 
 
+def test_every_table_lies_beside_the_page_as_data(files, sources):
+    loads = files["tables/09-loads-1.csv"].decode().splitlines()
+    heads = next(csv.reader(loads[:1]))
+    assert len(heads) == 5
+    rows = {row[0]: row[1:] for row in csv.reader(loads[1:])}
+    told = sources["report.json"]["results"]["loads"]
+    ends = [told[who][end] for who in ("held", "compensated") for end in ("hook_load", "drum")]
+    found = [float(cell) for cell in rows["dynamic amplification factor (DAF)"]]
+    assert found == [end["daf"] for end in ends]
+    for name, content in files.items():
+        if name.startswith("tables/"):
+            lengths = {len(row) for row in csv.reader(content.decode().splitlines())}
+            assert len(lengths) == 1, name
+
+
 def test_every_failure_that_was_run_says_what_the_load_does(sources, page):
     told = sources["report.json"]["results"]["failures"]
     ran = [mode for mode in told["modes"] if mode["first"]]
@@ -286,10 +307,6 @@ def quick(monkeypatch):
     monkeypatch.setattr(document, "inline_svg", nothing)
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
 @pytest.mark.usefixtures("quick")
 def test_the_same_report_is_the_same_to_the_last_byte(tmp_path):
     block = sh.TitleBlock(date="2026-11-28")
@@ -302,7 +319,8 @@ def test_the_same_report_is_the_same_to_the_last_byte(tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_a_second_case_writes_nothing_of_the_first(tmp_path):
     first, second = design_of(CASE), design_of(CASE, **{"name": "other", "rope.length": 1500.0})
-    sh.write_report(tmp_path / "a", design=first, block=BLOCK)
+    runs = sh.simulate(first.case, first, duration="40 s")
+    sh.write_report(tmp_path / "a", design=first, runs=runs, block=BLOCK)
     before = contents(tmp_path / "a")
     with pytest.raises(InputError, match=r"holds the report of another case \(thesis-1975, "):
         sh.write_report(tmp_path / "a", design=second)
@@ -311,7 +329,10 @@ def test_a_second_case_writes_nothing_of_the_first(tmp_path):
         tmp_path / "a", design=second, force=True, block=sh.TitleBlock(date="2026-11-28")
     )
     sh.write_report(tmp_path / "b", design=second, block=sh.TitleBlock(date="2026-11-28"))
-    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+    assert [name for name in before if "energy" in name]
+    assert contents(tmp_path / "a") | {".stillhook": b""} == contents(tmp_path / "b") | {
+        ".stillhook": b""
+    }
     for content in contents(tmp_path / "a").values():
         assert first.case.digest.encode() not in content
         assert b"Lifting" not in content
@@ -326,7 +347,8 @@ def test_without_typst_the_page_is_made_and_an_older_pdf_goes(tmp_path, monkeypa
     assert "report.pdf" in names
     monkeypatch.setattr(write, "can_typeset", lambda: False)
     names = {path.name for path in sh.write_report(tmp_path, design=design)}
-    assert names == {"report.html", "report.json", "case.yaml", "design.yaml"}
+    assert {"report.html", "report.json", "case.yaml", "design.yaml"} < names
+    assert "report.pdf" not in names
     assert not (tmp_path / "report.pdf").exists()
 
 
