@@ -42,7 +42,16 @@ from .wording import (
 _ID = f"{RESULTS}/identification"
 _MOTION = f"{RESULTS}/motion"
 _MOTIONS = {"hook": "hook", "load, drum held": "held", "load, compensated": "compensated"}
-_BRIEF = ("title", "project", "client", "document", "date")
+_BRIEF = {
+    "title": "title",
+    "project": "project",
+    "client": "client",
+    "document": "document",
+    "date": "date",
+    "prepared by": "author",
+    "checked by": "checker",
+    "approved by": "approver",
+}
 _ASSUMPTIONS = (
     "Figures hold for the inputs of the basis of design, in long-crested or spread seas as stated "
     "there; seas, sensor noise and motion are Gaussian, and largest values are those of the "
@@ -59,9 +68,9 @@ _ASSUMPTIONS = (
 def identification(s: Sources) -> ReportSection:
     """Return which document this is: case, code, seeds, revisions, status and assumptions."""
     rows: list[tuple[str, Any]] = []
-    for name in _BRIEF:
+    for label, name in _BRIEF.items():
         if s.value(f"{_ID}/{name}"):
-            rows.append((name, s.cite(f"{_ID}/{name}")))
+            rows.append((label, s.cite(f"{_ID}/{name}")))
     rows += [
         ("case", s.say("{}: {}", s.cite(f"{_ID}/case"), s.cite(f"{_ID}/description"))),
         ("hash of the case (SHA-256)", s.cite(f"{_ID}/digest")),
