@@ -304,7 +304,8 @@ def expected_table(design: Design) -> Table | None:
     """Return what signals most probably reach with losses that switch; None without a loop."""
     if not has_loop(design) or design.margins is None:
         return None
-    plant, time = design.question.plant, design.case.limits.exposure_time
+    plant, limits = design.question.plant, design.case.limits
+    time = limits.equivalent_exposure  # as often exceeded as the limits are
     rows = []
     for signal in design.shares:
         unit = "rpm" if signal == "motor.speed" else plant.units[signal]
@@ -313,7 +314,10 @@ def expected_table(design: Design) -> Table | None:
         rest = rest if abs(rest) > _ROUNDED * up else 0.0
         figures = rest, design.switched.deviation(signal), rest + up, rest - down
         rows.append((_signal(signal), *(Written(x, quantity(x, unit)) for x in figures)))
-    heads = columns(f"signal=expected in {duration(time)}; rest=at rest; rms; largest; least")
+    within = duration(limits.exposure_time)
+    if not math.isclose(time, limits.exposure_time):
+        within += f", exceeded in {percent(limits.exceedance)} of them"
+    heads = columns(f"signal=expected in {within}; rest=at rest; rms; largest; least")
     notes = (
         ("limits hold the losses in full: they are on the safe side",)
         if any(plant.loss.values())

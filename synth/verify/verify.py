@@ -429,7 +429,8 @@ def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, f
     Displacement and tension go up from the payload by transfer matrices: slings (1, 1/k), hook
     block (m s^2, 1), rope and the crane's tip (1, 1/k).
 
-    The source is the hook's motion; the drag coefficient is in N s/m.
+    The source is the hook's motion; the drag coefficient is in N s/m.  Where nothing damps a mode
+    among the waves the payload's are infinite.
     """
     if source.band is None:
         raise SolverError("verification: the hook's motion has no band")
@@ -452,6 +453,12 @@ def held_moments(data: PlantData, source: Source, drag: float) -> tuple[float, f
     load = data.payload_mass + data.block_mass
     load += data.rope_mass if data.lumping == "thesis" else 0.0
     decay[0] += 0.5 * drag / load
+
+    low, high = source.band
+    if np.any((decay == 0.0) & (modes > low) & (modes < high)):
+        ends = panels(low, high, source.splits, np.zeros(0, dtype=complex))
+        (hook,) = integrate(lambda omega: source.density(omega)[None], ends, rtol=_HELD_RMS)
+        return float(hook), math.inf, math.inf
 
     def densities(omega: FloatArray) -> FloatArray:
         s = imaginary(omega)

@@ -247,6 +247,13 @@ def test_what_signals_most_probably_reach_is_told_with_their_value_at_rest():
     assert torque < crane.limits["motor.torque.peak"].value
     assert expected_table(unstable_design()) is None
     assert expected_table(loopless_design()) is None
+    # With another probability of exceedance they are still what the limits hold.
+    gains = {"A": 200, "a": 50, "a1": 100, "a2": 100}
+    rare = sh.evaluate_gains(load_case("thesis-1975").replace({"limits.exceedance": 0.1}), gains)
+    table = expected_table(rare)
+    assert table.headings[0] == "expected in 3 h, exceeded in 10.0 % of them"
+    torque = next(row[3].value for row in table.rows if row[0] == "motor torque")
+    assert torque == pytest.approx(rare.limits["motor.torque.peak"].value)
 
 
 def test_margins_in_words():

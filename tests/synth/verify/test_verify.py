@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -468,3 +469,13 @@ def test_verifying_warns_of_nothing(thesis: Design) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert verify_design(thesis).ok
+
+
+def test_a_load_that_nothing_damps_moves_without_end_by_both_routes() -> None:
+    still = {"method": "given", "coefficient": 0.0}
+    case = load_case("thesis-1975").replace({"payload.drag": still, "rope.damping_ratio": 0.0})
+    found = evaluate_gains(case, {"A": 200, "a": 50, "a1": 100, "a2": 100}).verify()
+    check = found["payload_rms_before"]
+    assert check.ok
+    assert (check.claimed, check.found) == (math.inf, math.inf)
+    assert found["hook_rms"].ok
