@@ -17,8 +17,9 @@ handed in as a fallback hears all the time, and its command is passed on instead
 
 Peak torque and current are constants; the power limit narrows the window with the speed, which is
 taken from the last plan; the voltage of a DC drive bounds the first move by the speed that is there
-now.  The windings' temperature follows from the torque that the drive reports.  So does the peak,
-where the drive reports that it follows less.
+now.  The windings' temperature follows from the torque that the drive reports.  So do peak and
+power, where the drive reports that it follows less; and by what it can brake with that power the
+plan keeps the speed of lowering.
 """
 
 import math
@@ -78,10 +79,12 @@ _EDGE = 1e-7  # of a move that is at its bound
 _MOST = 0.2  # of the peak: half of what the torque may fall by over a sample
 _MORE = 0.2  # of the fall, so that the drive stays at its peak though the plan is off
 _STATIC = 1.2  # of the static torque: never less, whatever the temperature
-_SHORT = 3  # samples in a row that a drive gives less than asked, until that is its peak
-_SEEN = 5e-3  # of the peak: what is less is no difference
-_PROBE = 0.01  # of the peak learnt, by which a drive that follows there is asked for more
-_LEAST = 0.3  # of the peak: who gives less is not engaged
+_BRAKES = 1.05  # of the static torque, which there is to be at any speed of lowering
+_SHORT = 3  # samples in a row that a drive gives less than asked, until that is its limit
+_SEEN = 5e-3  # of a limit: what is less is no difference
+_LAGS = 0.03  # of the power: a torque that comes late to its limit as the speed falls shows less
+_PROBE = 0.01  # of a limit learnt, by which a drive that follows there is asked for more
+_LEAST = 0.3  # of what it could give: who gives less is not engaged
 
 
 class WinchOptions(TypedDict, total=False):
@@ -140,6 +143,7 @@ class WinchMPC(ABC):
     programme: Condensed
     products: Products
     qp: SoftQP
+    _further = 0  # rows that the solver is asked after those of the programme
 
     def __init__(
         self,
@@ -368,6 +372,7 @@ class WinchMPC(ABC):
 
     def _solve(self, question: Question, began: float) -> float | None:
         """Return the first move of the answer, None if there is none that is good."""
+        question = self._braked(question)
         self.question, self.solved, self._answered = question, None, False
         # The estimate is finite (`WinchEstimator`): it is the forecast that is not.
         if not all(math.isfinite(float(part.sum())) for part in question):
@@ -387,6 +392,18 @@ class WinchMPC(ABC):
         soon = solved.multipliers[: self._of[self._stale - 1] + 1]
         self._plan, self._age = solved.v if soon.any() else None, 0
         return float(solved.v[0])
+
+    def _braked(self, question: Question) -> Question:
+        """Return a question whose plan lowers no faster than the drive's power can brake."""
+        told = self.soft_limits.get("speed", (0.0, 0.0))[0]
+        if self.window.lowering >= -told:
+            return question
+        p, (gradient, lower, upper) = self.programme, question
+        speed = np.flatnonzero(p.kind == p.signals.names.index("speed"))
+        lower = lower.copy()
+        at = len(lower) - self._further - len(p.kind) + speed
+        lower[at] += (-self.window.lowering - told) * p.scale[speed]
+        return gradient, lower, upper
 
     def _given(self, command: float) -> float:
         """Return a command within the voltage, of which note is taken."""
@@ -508,29 +525,46 @@ class DriveWindow:
     def __init__(self, winch: SampledWinch, limits: DriveLimits, moves: int, unit: float) -> None:
         self._winch, self._unit = winch, unit
         constant = winch.data.torque_constant if winch.dc else 1.0
-        self._moves, self._told = moves, min(limits.torque, constant * limits.current)
+        self._moves, self._peak = moves, min(limits.torque, constant * limits.current)
         self.voltage = limits.voltage if winch.dc else math.inf
-        self.limits = limits
-        self.narrows = min(limits.power, limits.breakdown) < math.inf
+        self._told = limits
+        # A power of which the drive has no use is no limit.
+        self._full = min(limits.power, self._peak * limits.speed)
         #: What the torque of a held command falls by for each rad/s that the motor gets faster.
         self.fall = winch.gain * winch.back
         self.reset()
 
     def reset(self) -> None:
-        """Hold the drive's peak to be what it was told to be."""
-        self._short = 0  # samples in a row in which it gave less than asked
-        self._take(self._told)
+        """Hold the drive's limits to be what they were told to be."""
+        self.limits = self._told  #: Those told, but for the power learnt.
+        # Torque and power while it gives less than asked, of the last samples in a row.
+        self._short: list[tuple[float, float]] = []
+        self._take(self._peak)
 
     @property
     def derated(self) -> bool:
-        """Whether the drive gives less than its peak was told to be."""
-        return self.peak < self._told
+        """Whether the drive gives less than its peak, or its power, was told to be."""
+        return self.peak < self._peak or self.limits.power < self._told.power
+
+    @property
+    def narrows(self) -> bool:
+        """Whether a fast motor has less torque."""
+        return min(self.limits.power, self.limits.breakdown) < math.inf
+
+    @property
+    def lowering(self) -> float:
+        """Highest speed of lowering at which the power can brake the load [rad/s].
+
+        Beyond it a load runs away: the faster it is, the less torque there is to hold it.
+        """
+        return self.limits.power / (_BRAKES * abs(self._winch.rest_torque))
 
     def follow(self, torque: float, left_out: float, speed: float) -> bool:
-        """Learn the peak from what the drive follows; return whether it left some out.
+        """Learn peak and power from what the drive follows; return whether it left some out.
 
-        Where it gives less than asked, and less than its limits say, for some samples, that is its
-        peak; where it then gives as much as it is asked for, the peak is probed a little higher.
+        Where it gives less than asked, and less than its limits say, for some samples, it is at a
+        limit, that of its power if this stays the same rather than its torque.  Where it then gives
+        as much as it is asked for, that limit is probed a little higher.
 
         Parameters
         ----------
@@ -541,27 +575,52 @@ class DriveWindow:
         speed
             The motor's [rad/s].
         """
-        given = abs(torque)
-        if math.copysign(self._winch.gain, torque) * left_out > _SEEN * self._told:
-            self._short += 1
-            if self._short < _SHORT or not _LEAST * self._told < given:
-                return True
-            # Near its highest speed the drive's own window closes.
-            clear = abs(speed) < (1.0 - _CLEAR) * self.limits.speed
-            below = clear and given < (1.0 - _SEEN) * self.limits.top(speed, self._told)
-            if below or given > self.peak:
-                self._take(min(given, self._told))
+        given, power, known = abs(torque), abs(torque * speed), self.limits.power
+        if math.copysign(self._winch.gain, torque) * left_out > _SEEN * self._peak:
+            self._short = [*self._short[1 - _SHORT :], (given, power)]
+            if len(self._short) == _SHORT:
+                self._learn(given, power, abs(speed))
             return True
-        self._short = 0
-        if self.derated and given > (1.0 - _SEEN) * self.peak:
-            self._take(min((1.0 + _PROBE) * max(given, self.peak), self._told))
+        self._short = []
+        if self.peak < self._peak and given > (1.0 - _SEEN) * self.peak:
+            self._take((1.0 + _PROBE) * max(given, self.peak))
+        if known < self._told.power and power > (1.0 - _SEEN) * known:
+            self._take_power((1.0 + _PROBE) * max(power, known))
         return False
 
+    def _learn(self, given: float, power: float, speed: float) -> None:
+        """Learn from a drive that gives less than asked what its peak is, or its power.
+
+        Which of the two it is shows as the speed changes.  A torque that has the power which is
+        known already tells nothing of the peak.
+        """
+        top, known = float(self._told.top(speed, self._peak)), self.limits.power
+        if not _LEAST * top < given:
+            return
+        # Near its highest speed the drive's own window closes.
+        below = speed < (1.0 - _CLEAR) * self._told.speed and given < (1.0 - _SEEN) * top
+        of_power = power > (1.0 - _LAGS) * known or _steadier_power(self._short)
+        # What it gives it can give, whatever was thought before.
+        if (below and not of_power) or given > self.peak:
+            self._take(given)
+        less = below and power < (1.0 - _LAGS) * self._told.power
+        if (less and of_power) or power > known:
+            self._take_power(power)
+
     def _take(self, peak: float) -> None:
-        """Take a torque as the drive's peak [N m]."""
-        self.peak, rest = peak, self._winch.rest_torque
-        self._low = np.full(self._moves, (-peak - rest) / self._unit)
-        self._high = np.full(self._moves, (peak - rest) / self._unit)
+        """Take a torque as the drive's peak [N m], at most what was told.
+
+        It is never less than what holds the load, without which no plan has a way to go.
+        """
+        rest = self._winch.rest_torque
+        self.peak = min(max(peak, abs(rest)), self._peak)
+        self._low = np.full(self._moves, (-self.peak - rest) / self._unit)
+        self._high = np.full(self._moves, (self.peak - rest) / self._unit)
+
+    def _take_power(self, power: float) -> None:
+        """Take a power as the drive's limit [W], that told if it is no less."""
+        less = power < self._full
+        self.limits = replace(self._told, power=power) if less else self._told
 
     def bounds(
         self, speed: float, speeds: FloatArray, cap: float, changes: FloatArray | None = None
@@ -628,6 +687,13 @@ class DriveWindow:
                 more = max(0.0, side * 0.5 * fall) + _MORE * abs(fall)
                 return torque + side * more, held
         return torque, math.nan
+
+
+def _steadier_power(shown: list[tuple[float, float]]) -> bool:
+    """Return whether power rather than torque stayed the same over samples of (torque, power)."""
+    torques, powers = zip(*shown, strict=True)
+    of_torque, of_power = max(torques) - min(torques), max(powers) - min(powers)
+    return bool(of_power * max(torques) < of_torque * max(powers))
 
 
 class TorqueBudget:

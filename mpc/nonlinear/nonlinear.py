@@ -138,7 +138,7 @@ class NonlinearMPC(WinchMPC):
             self._sea_covariance,
             self.estimator.model,
         )
-        powers = len(p.blocks) - 1 if self.window.narrows else 0
+        powers = self._further = len(p.blocks) - 1 if self.window.narrows else 0
         self._low = np.concatenate([p.row_low, -np.ones(powers)])
         self._high = np.concatenate([p.row_high, np.ones(powers)])
         self._ends = path_of_sea(self.model, 1)
@@ -253,9 +253,11 @@ class NonlinearMPC(WinchMPC):
     def hard_bounds(self, speed: float, cap: float = math.inf) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and highest moves (nb,) at a motor speed [rad/s] and a cap [N m].
 
-        The power of later moves has rows of its own.
+        The power of later moves has rows of its own, but for one that was learnt of a drive that
+        is told to have no limit of it.
         """
-        return self.window.bounds(speed, np.zeros(len(self.programme.blocks)), cap)
+        speeds = np.zeros(len(self.programme.blocks)) if self._further else self._speeds
+        return self.window.bounds(speed, speeds, cap)
 
     def _drift(self, chi: FloatArray, torque: float, ends: FloatArray) -> float:
         """Return what a move [N m] has at the start of the sample over its mean [N m]."""

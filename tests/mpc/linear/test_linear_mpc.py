@@ -16,6 +16,7 @@ import models
 import stillhook as sh
 from models.case import bundled_cases
 from models.operation import scenario_named
+from models.operation.faults import with_faults
 from models.plant import DriveLimits
 from models.sensing import HEARD, Measurement
 from models.simulation import prepare
@@ -696,6 +697,55 @@ def test_a_peak_is_learnt_from_what_is_followed_for_some_samples_and_probed():
     assert follow(0.9, asked, samples=4) == pytest.approx(0.9)
     assert follow(1.0, 0.0) == 1.0
     assert not window.derated
+
+
+def test_half_the_power_is_no_lower_peak_and_the_load_is_held():
+    """Taken for a torque it once was a peak that could not hold the load, which fell by metres."""
+    controller = controller_of("subsea-crane")
+    case, seconds = controller.case, 60.0
+    faults = {"fault.at": 20.0, "fault.lasting": 60.0, "fault.power_limit": 0.5}
+    halved = with_faults(scenario_named("hold", case), faults, case, seconds)
+    options = {"scenario": halved, "seeds": [5], "settle": 20.0}
+    run = run_of(controller, seconds, **options)
+    window, told = controller.window, case.winch.power_limit
+    assert np.abs(run["payload.displacement"]).max() < 0.05
+    assert window.limits.power == pytest.approx(0.5 * told, rel=0.03)
+    assert window.peak == case.winch.drive.torque_peak
+    assert run["motor.speed"].min() > -0.5 * told / controller.model.winch.rest_torque
+    assert controller.counts["derated"] > 100
+    # The plan looks after the speed of lowering by what that power holds.
+    assert window.lowering == pytest.approx(102.0, rel=0.03)
+    controller.reset()
+    assert window.limits.power == told
+    assert not window.derated
+
+
+def test_a_power_is_learnt_from_a_torque_that_falls_as_the_speed_rises_and_probed():
+    window = controller_of("subsea-crane").window
+    peak, told = window.peak, window.limits.power
+
+    def short(torques: list[float], speeds: list[float], left_out: float = 1e3) -> None:
+        for torque, speed in zip(torques, speeds, strict=True):
+            window.follow(torque, left_out, speed)
+
+    speeds = [-60.0, -70.0, -80.0]
+    short([0.5 * told / abs(speed) for speed in speeds], speeds)
+    assert (window.peak, window.limits.power) == (peak, pytest.approx(0.5 * told))
+    short([0.5 * told / 70.0] * 3, [-70.0] * 3)  # the same limit, at a speed that stays
+    assert window.peak == peak
+    for _ in range(9):
+        window.follow(0.0, 0.0, -70.0)  # tells nothing
+    assert window.limits.power == pytest.approx(0.5 * told)
+    window.follow(0.5 * told / 80.0, 0.0, -80.0)  # follows there: probed
+    assert window.limits.power == pytest.approx(0.505 * told)
+    short([0.8 * peak] * 3, [-30.0, -20.0, -10.0])  # the torque stays: that is the peak
+    assert window.peak == pytest.approx(0.8 * peak)
+    window.follow(told / 100.0, 0.0, -100.0)
+    assert window.limits.power == told
+    window.reset()
+    # What is less than its weight is no peak: the plan would have no way to hold the load.
+    short([0.32 * peak] * 3, [-30.0, -20.0, -10.0])
+    assert window.peak == pytest.approx(controller_of("subsea-crane").model.winch.rest_torque)
 
 
 @pytest.mark.parametrize("inertia", [1.3, 0.7])
