@@ -125,14 +125,14 @@ class Document:
         ]
         return {"stillhook_report": FORMAT, **own, "figures": figures}
 
-    def pages(self, progress: Progress | None = None) -> dict[str, Any]:
-        """Return the document as plain parts, each figure drawn.
+    def pages(self, progress: Progress | None = None, *, figures: bool = True) -> dict[str, Any]:
+        """Return the document as plain parts, each figure drawn unless none are wanted.
 
         A part is ``{"kind": "words", "parts": [...]}``, a ``table``, a ``figure`` with its
         ``svg``, a ``listing``, or a ``section`` with ``title`` and ``items``; parts of words are
         ``{"text": ...}``, with ``id`` and ``place`` where they are a figure, or ``{"code": ...}``.
         """
-        maker = _Pages(len(self.report.drawings), progress)
+        maker = _Pages(len(self.report.drawings) if figures else 0, progress)
         chapters = [maker.section(section) for section in self.report.sections]
         head = {"title": self.report.name, "about": self.report.about}
         verdict = {"ok": self.report.ok, "status": self.report.status}
@@ -172,6 +172,8 @@ class _Pages:
         return [{"kind": "words", "parts": self.words(item, whole=True)}]
 
     def drawing(self, drawing: Drawing) -> list[dict[str, Any]]:
+        if not self._drawings:
+            return []
         if self._progress is not None:
             self._progress("figures", self._drawn, self._drawings)
         self._drawn += 1

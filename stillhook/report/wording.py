@@ -52,7 +52,7 @@ def exact(value: float) -> str:
     Examples
     --------
     >>> exact(0.0165), exact(1.276e8), exact(2.0)
-    ('0.0165', '1.276e+08', '2')
+    ('0.0165', '127600000', '2')
     """
     return f"{value:.10g}"
 

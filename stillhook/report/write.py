@@ -48,6 +48,7 @@ def write_report(
     held: Runs | None = None,
     requirement: Mapping[str, Any] | None = None,
     bound: bool = True,
+    figures: bool = True,
     block: TitleBlock | None = None,
     force: bool = False,
     progress: Progress | None = None,
@@ -74,6 +75,8 @@ def write_report(
         default what `operability` was asked for.
     bound
         Whether to compute the best that any linear controller could do, some 15 s.
+    figures
+        Whether to draw figures.
     block
         Title, client, names and revisions (`TitleBlock`).
     force
@@ -113,7 +116,7 @@ def write_report(
     if bound and progress is not None:
         progress("bound", 0, 1)
     document = Document.of(findings, block or TitleBlock(), bound=bound)
-    pages = document.pages(progress)
+    pages = document.pages(progress, figures=figures)
     if progress is not None:
         progress("pages", 0, 1)
     # Made before anything is written: a report is there whole, or the one before it.

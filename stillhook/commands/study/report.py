@@ -113,6 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
                 design=design,
                 requirement=required,
                 bound=arguments.bound,
+                figures=arguments.figures,
                 block=block,
                 force=arguments.force,
                 progress=tell,
@@ -166,7 +167,8 @@ def _studies(
 
     def compared() -> dict[str, Any]:
         store = Path(arguments.comparison or folder.at(_FOLDER))
-        return {"comparison": sh.compare(case, design=design, out=store, progress=tell)}
+        found = sh.compare(case, design=design, out=store, traces=arguments.figures, progress=tell)
+        return {"comparison": found}
 
     def worked() -> dict[str, Any]:
         study = sh.operability(

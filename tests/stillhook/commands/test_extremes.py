@@ -27,12 +27,16 @@ OF_GAINS = (
     "sensitivity CASE --second 0",
     "operability CASE --tp 6,12 --payload-rms '1 m'",
     "sweep CASE --samples 16 --vary payload.drag_coefficient=30%",
+    "report CASE --no-bound --out out/report "
+    "--without comparison,operability,sweep,sensitivity,robustness,failures,simulation",
 )
 IN_TIME = (
     "simulate CASE --duration '30 s' --controller feedback,none,feed-forward,constant-tension",
     "sweep CASE --mode time --samples 2 --duration '20 s' --jobs 1 --out out/time "
     "--vary payload.drag_coefficient=30%",
     "compare CASE --controllers none,feed-forward,thesis --seeds 1 --duration '20 s' --jobs 1",
+    "report CASE --no-bound --seeds 1 --out out/whole "
+    "--without comparison,operability,sweep,sensitivity,robustness",
 )
 SEARCHES = (
     "optimise CASE --structure payload-feedback --no-bound",

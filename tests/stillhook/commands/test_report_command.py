@@ -86,6 +86,14 @@ def test_without_typst_the_sentence_says_how_to_have_it(run, tmp_path, monkeypat
     assert not (tmp_path / "out/thesis-1975-report/report.pdf").exists()
 
 
+def test_without_figures_it_has_none(run, tmp_path, monkeypatch):
+    from stillhook.report import document
+
+    monkeypatch.setattr(document, "inline_svg", lambda drawing: pytest.fail("drawn"))
+    assert run(*REPORT, "--without", ALL, "--no-figures").status == 1
+    assert "<figure>" not in (tmp_path / "out/thesis-1975-report/report.html").read_text()
+
+
 def test_as_json_it_is_the_verdict_and_the_files(run):
     found = run(*REPORT, "--without", ALL, "--json")
     data = json.loads(found.out)
