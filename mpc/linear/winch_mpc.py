@@ -578,7 +578,7 @@ class DriveWindow:
         given, power, known = abs(torque), abs(torque * speed), self.limits.power
         if math.copysign(self._winch.gain, torque) * left_out > _SEEN * self._peak:
             self._short = [*self._short[1 - _SHORT :], (given, power)]
-            if len(self._short) == _SHORT:
+            if len(self._short) == _SHORT and math.isfinite(power):
                 self._learn(given, power, abs(speed))
             return True
         self._short = []
