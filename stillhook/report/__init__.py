@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .data import verdict
     from .findings import Findings, Revision, TitleBlock, requirement_of
     from .pages import can_typeset
     from .write import NO_PDF, belongs_to, write_report

@@ -87,12 +87,12 @@ class Document:
             verification(s),
             appendix(s, told),
         ]
-        title = s.value(f"{OWN}#/results/identification/title")
+        told_of = s.value(f"{OWN}#/results/identification")
         report = Report(
-            name=title,
-            about=str(s.value(f"{OWN}#/results/identification/description")),
-            status=design.status,
-            ok=design.ok,
+            name=told_of["title"],
+            about=told_of["description"],
+            status=told_of["status"],
+            ok=told_of["ok"],
             sections=chapters,
         )
         return cls(sources=s, report=report, design_text=told.design_text)

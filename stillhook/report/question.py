@@ -102,29 +102,25 @@ def identification(s: Sources) -> ReportSection:
         rows_table(rows, "name=; text=<"),
         table,
         ReportSection("Status and assumptions", [
-            s.say("Status: {}.", s.cite(f"{DESIGN}#/status")), *_ASSUMPTIONS
+            s.say("Status: {}.", s.cite(f"{_ID}/status")), *_ASSUMPTIONS
         ]),
     )  # fmt: skip
 
 
 def summary(s: Sources, findings: Findings) -> ReportSection:
     """Return the verdict, the load's motion against what is required, and what limits it."""
-    design = findings.design
     moves = f"{_MOTION}/compensated"
-    verdict = s.say(
-        "The design keeps every limit in H_s {}: the load moves {} rms, {} of the hook's motion.",
-        s.cite(f"{DESIGN}#/significant_height", "m"),
-        s.cite(f"{DESIGN}#/payload_rms", "m"),
-        s.cite(f"{_MOTION}/residual", write=percent),
-    )
-    if not design.ok:
-        verdict = s.say("The design is NOT ok: {}.", s.cite(f"{DESIGN}#/status"))
+    verdict = s.say("The design is NOT ok: {}.", s.cite(f"{_ID}/status"))
+    if s.value(f"{_ID}/ok"):
+        verdict = s.say(
+            "The design keeps every limit in H_s {}: the load moves {} rms, {} of the hook's "
+            "motion.",
+            s.cite(f"{DESIGN}#/significant_height", "m"),
+            s.cite(f"{DESIGN}#/payload_rms", "m"),
+            s.cite(f"{_MOTION}/residual", write=percent),
+        )
     rows = []
-    for name, key in (
-        ("hook", "hook"),
-        ("load, drum held", "held"),
-        ("load, compensated", "compensated"),
-    ):
+    for name, key in _MOTIONS.items():
         place = f"{_MOTION}/{key}"
         if s.has(place):
             rows.append(
@@ -231,9 +227,7 @@ def _input(s: Sources, place: str, value: Any, unit: str) -> Written:
     if isinstance(value, bool | str):
         return s.cite(place, write=lambda given: str(given))
     if unit == "rad":
-        return s.cite(
-            place, unit, write=lambda angle: f"{exact(round(math.degrees(angle), 8))} deg"
-        )
+        return s.cite(place, unit, write=_exact_degrees)
     if unit == "rad/s" and "speed" in place:
         unit = "rpm"  # of a motor
     factor, name = scale(unit, value)

@@ -133,15 +133,12 @@ def energy(s: Sources) -> ReportSection:
         if s.has(f"{place}/value"):
             between: Any = ""
             if s.has(f"{place}/low") and s.has(f"{place}/high"):
-                between = s.say(
-                    "{} to {}", s.cite(f"{place}/low", unit), s.cite(f"{place}/high", unit)
-                )
+                ends = (_spent(s, f"{place}/{end}", unit) for end in ("low", "high"))
+                between = s.say("{} to {}", *ends)
             rows.append((label, _spent(s, f"{place}/value", unit), between))
     runs = s.say(
         "Mean over {} of {} each in the case's own sea, with the intervals of that mean.",
-        s.cite(f"{at}/shares/lost lock/total", write=lambda n: f"{n} run{'s' * (n != 1)}")
-        if s.has(f"{at}/shares/lost lock")
-        else "all runs",
+        s.cite(f"{at}/seeds", write=lambda seeds: count(len(seeds), "run")),
         s.cite(f"{at}/duration", "s", write=duration),
     )
     table = rows_table(rows, "name=quantity; figure=mean; between=interval")
@@ -209,7 +206,8 @@ def verification(s: Sources) -> ReportSection:
     )  # fmt: skip
     words = (
         "Route 1 is what the design claims; route 2 is other code, which shares neither plant, "
-        "quadrature nor search with it. In SI units; of a bound, route 1 is the bound."
+        "quadrature nor search with it. In SI units; of a bound that is kept, route 1 is the "
+        "bound, and no difference is told."
     )
     return chapter(
         "Verification",

@@ -6,13 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ..text import ReportSection, Sentence, Table, Written, columns, duration
+from ..text import ReportSection, Table, Written, columns, duration
 from .sources import Sources
 
 CASE, DESIGN, OWN = "case.yaml", "design.yaml", "report.json"
 RESULTS = f"{OWN}#/results"
-
-Figure = Written | Sentence | str
 
 
 def rows_table(rows: Sequence[Sequence[Any]], heads: str = "name=; figure=; remark=<") -> Table:

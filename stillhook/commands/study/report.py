@@ -1,7 +1,7 @@
 """`stillhook report`: a design and the studies of it as one document for clients and surveyors.
 
 What is not given is run: the best design, its studies, simulations and failures.  Exit status 0 if
-the design is ok, 1 if not.
+the design is ok and keeps what is required, 1 if not.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +28,8 @@ from ..working import conclude, place_for, prepared, tidy, working
 if TYPE_CHECKING:
     from models import Case
     from synth.design import Design
+
+    from ...report import Findings
 
 PARTS = (
     "comparison", "operability", "sweep", "sensitivity", "robustness", "failures", "simulation"
@@ -81,8 +83,17 @@ ARGUMENTS = (
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run what is missing, and write the report; return 0 if the design is ok, 1 if not."""
-    from ...report import Revision, TitleBlock, belongs_to, can_typeset, write_report
+    """Run what is missing, and write the report; return 0 if it says ok, 1 if not."""
+    from ...report import (
+        NO_PDF,
+        Findings,
+        Revision,
+        TitleBlock,
+        belongs_to,
+        can_typeset,
+        requirement_of,
+        write_report,
+    )
 
     for name in arguments.without or ():
         if name not in PARTS:
@@ -101,8 +112,6 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.force:
         belongs_to(place, case)
     with tidy(place):
-        from ...report import requirement_of
-
         requirement_of(case, required)
         folder = prepared(arguments, place)
         design = _design(case, arguments)
@@ -119,10 +128,9 @@ def run(arguments: argparse.Namespace) -> int:
                 progress=tell,
                 **studies,
             )
-    report = _told(design, folder, studies)
+    findings = Findings(design=design, required=requirement_of(case, required), **studies)
+    report = _told(findings, folder)
     if not can_typeset():
-        from ...report import NO_PDF
-
         report = _with_note(report, NO_PDF)
     report = with_design(report, design, case, arguments)
     return conclude(report, arguments, folder, _next(design, folder, arguments))
@@ -217,16 +225,24 @@ def _whole(study: Any) -> bool:
     return bool(getattr(study, "complete", True))
 
 
-def _told(design: Design, folder: OutputFolder, studies: dict[str, Any]) -> Report:
+def _told(findings: Findings, folder: OutputFolder) -> Report:
     """Return what the terminal says: the verdict, and what the document holds."""
-    there = [name for name, study in studies.items() if study is not None]
+    from ...report import verdict
+
+    there = [
+        field.name
+        for field in fields(findings)
+        if field.name not in ("design", "required") and getattr(findings, field.name) is not None
+    ]
+    ok, status = verdict(findings)
+    design = findings.design
     rows = [("document", str(folder.path / "report.html"))]
     rows += [("with", ", ".join(there) or "the design alone")]
     return Report(
         name=design.case.name,
         about=" ".join(design.case.description.split()),
-        status=design.status,
-        ok=design.ok,
+        status=status,
+        ok=ok,
         sections=[ReportSection("", [pairs(rows)])],
     )
 

@@ -228,6 +228,24 @@ def test_the_summary_says_what_the_design_says(sources):
     assert wanted["bound"] == 0.05
     assert wanted["value"] == pytest.approx(design["payload_rms"])
     assert wanted["kept"] == (design["payload_rms"] <= 0.05)
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("required", ["1 m", "1 mm"])
+def test_a_design_that_misses_the_requirement_is_not_ok_for_the_client(tmp_path, required):
+    case = sh.load_case(CASE).replace({"limits.max_sensitivity": 10.0})
+    design = sh.evaluate_gains(case, {"A": 200, "a": 50, "a1": 100, "a2": 100})
+    assert design.ok
+    sh.write_report(tmp_path, design=design, requirement={"payload_rms": required})
+    told = json.loads((tmp_path / "report.json").read_text())["results"]["identification"]
+    text = " ".join(Page((tmp_path / "report.html").read_text()).words)
+    assert told["ok"] == (required == "1 m")
+    assert ("NOT ok" in text) == (required == "1 mm")
+    assert ("does not keep what is required: payload.rms" in told["status"]) == (required == "1 mm")
+
+
+def test_the_digest_is_that_of_the_case(sources):
+    own = sources["report.json"]["results"]
     assert own["identification"]["digest"] == sh.load_case(CASE).digest
 
 
