@@ -195,11 +195,13 @@ def conclude(
     else:
         show(report, out)
         out.print()
-        if written:
+        if folder is not None and written:
             pictures = [path for path in written if path.suffix in (".svg", ".png")]
-            names = [path.name for path in written if path not in pictures]
+            place = folder.path
+            tops = [path.relative_to(place).parts[0] for path in written if path not in pictures]
+            names = list(dict.fromkeys(tops))  # of a folder within its name alone
             names += [path.name for path in pictures] if len(pictures) <= _NAMED else ["figures"]
-            out.print(f"Written to {written[0].parent}: {', '.join(names)}", soft_wrap=True)
+            out.print(f"Written to {place}: {', '.join(names)}", soft_wrap=True)
         if following:
             commands(following, out)
     return 1 if report.ok is False else 0

@@ -33,7 +33,8 @@ def test_the_command_runs_what_is_missing_and_says_what_the_document_has(run, tm
     found = run(*REPORT, "--without", "comparison,robustness,sweep,failures", "--seeds", "1")
     assert found.status == 1, found.err  # the thesis's own gains break M_s
     assert "with      operability, sensitivity, runs, held" in found.out
-    assert "report.pdf" in found.out
+    names = "case.yaml, design.yaml, report.json, report.html, tables, report.pdf"
+    assert f"Written to out/thesis-1975-report: {names}\n" in found.out
     results = told(tmp_path)
     assert results["operation"]["design"]["seeds"] == [0]
     assert results["failures"] is None
