@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from models import Case
 
 _NAMES = ("A", "a", "a1", "a2")
+#: What of a plant may be off unless told otherwise, and by which share either way.
+USUALLY_OFF = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
 
 
 def given_case(arguments: argparse.Namespace) -> Case:

@@ -12,10 +12,7 @@ from typing import Any
 from models.rig import DCMotor
 from synth.design import Design
 
-from ..designs import (
-    AT_LEAST,
-    command_text,
-)
+from ..designs import AT_LEAST, command_text
 from ..text import (
     Column,
     Drawing,
@@ -92,18 +89,7 @@ def design_chapter(s: Sources, findings: Findings) -> ReportSection:
     rows = [*(f"x_{k + 1}" for k in range(len(states))), "u"]
     forms: list[Any] = []
     if len(states) <= LARGEST_LAW:
-        for form, name, words in (
-            (
-                "continuous",
-                "Continuous form: dx/dt and u by x and y",
-                "x' = A x + B y, u = C x + D y",
-            ),
-            (
-                "discrete",
-                "Discrete form: the next x, and u, by x and y",
-                "x+ = A x + B y, u = C x + D y",
-            ),
-        ):
+        for form, name, words in _FORMS:
             forms.append(f"`{words}`")
             forms.append(Table(title=name, columns=heads, rows=[
                 (label, *(s.cite(f"{at}/{form}/{r}/{c}", write=_entry)

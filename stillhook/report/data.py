@@ -27,7 +27,7 @@ from synth.question import system_facts
 from synth.structures import sampled
 
 from .._version import __version__
-from ..comparison import comparison_data, comparison_report
+from ..comparison import comparison_report
 from ..designs import (
     MotionView,
     alternatives_table,
@@ -167,9 +167,6 @@ def results(findings: Findings, block: TitleBlock, told: Told) -> dict[str, Any]
         "verification": _verification(design),
         "tables": told.tables,
         "reports": reports,
-        "comparison": None
-        if findings.comparison is None
-        else comparison_data(findings.comparison)["table"],
     }
     found: dict[str, Any] = json_data(tree)
     return found

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from synth.limits import Limit
 
 _OWNER = "report"
-_CHANGED = ("drive", "exceedance")  # fields of the limits that a study may pose differently
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +148,7 @@ class Findings:
             found["sweep"] = swept
         own = self.design.case
         for what, case in found.items():
-            if _contents(case) != _contents(own):
+            if case != own:
                 raise InputError(
                     f"{_OWNER}: the {what} is of another case ({told(case)}) than the design "
                     f"({told(own)})"
@@ -201,10 +200,3 @@ def _case_of_sweep(result: xr.Dataset) -> Case | None:
     """Return the nominal case of a sweep."""
     header = result.attrs.get(ATTRIBUTE)
     return None if header is None else Case.from_stored(json.loads(header)["case"])
-
-
-def _contents(case: Case) -> str:
-    """Return what makes two cases the same question, but for what a study poses by itself."""
-    tree = case.to_dict()
-    limits = {name: v for name, v in tree["limits"].items() if name not in _CHANGED}
-    return json.dumps({**tree, "limits": limits}, sort_keys=True)

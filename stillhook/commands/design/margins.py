@@ -6,11 +6,9 @@ from models.spread import GAINS
 
 from ...text import Report, ReportSection
 from ..declare import CASE, DESIGN, options, within
-from ..given import case_words, given_case, read_pairs
+from ..given import USUALLY_OFF, case_words, given_case, read_pairs
 from ..given_design import given_design, with_design
 from ..working import conclude, working
-
-_USUAL = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}
 
 ARGUMENTS = (
     CASE,
@@ -29,7 +27,7 @@ ARGUMENTS = (
 def run(arguments: argparse.Namespace) -> int:
     """Analyse and show; return 0 if the loop is stable over the ranges, 1 if not."""
     case = given_case(arguments)
-    off = read_pairs("--off", "PATH=SHARE, as in payload.mass=0.3", arguments.off) or _USUAL
+    off = read_pairs("--off", "PATH=SHARE, as in payload.mass=0.3", arguments.off) or USUALLY_OFF
     design = given_design(case, arguments)
     from synth.robust import robustness
 

@@ -19,7 +19,7 @@ from models.basics import InputError
 
 from ...text import OutputFolder, Progress, Report, ReportSection, pairs
 from ..declare import CASE, DESIGN, NO_BOUND, REQUIRED, STILLNESS, changed_words, options, within
-from ..given import case_words, given_case
+from ..given import USUALLY_OFF, case_words, given_case
 from ..given_design import design_words, given_design, names_design, with_design
 from ..lists import axis, names
 from ..weather import WEATHER, asked_weather, found_windows
@@ -36,7 +36,6 @@ PARTS = (
 )  # fmt: skip
 """Studies that a report is made of, and that can be left out of it."""
 
-_OFF = {"payload.mass": 0.3, "stiffness": 0.2, "drag": 0.5}  # what may be off, and how far
 _SAMPLES = 2000  # plants of the sweep
 _LASTING = "30 min"  # of each simulation
 _FOLDER = "comparison"  # in the report's own, from which a comparison goes on
@@ -196,7 +195,7 @@ def _studies(
         "operability": worked,
         "sweep": lambda: {"sweep": sh.sweep(design, samples=_SAMPLES, progress=tell)},
         "sensitivity": lambda: {"sensitivity": sh.sensitivity(design, progress=tell)},
-        "robustness": lambda: {"robustness": sh.robustness(design, _OFF, progress=tell)},
+        "robustness": lambda: {"robustness": sh.robustness(design, USUALLY_OFF, progress=tell)},
         "failures": lambda: {
             "failures": sh.failure_modes(case, design, seeds=arguments.seeds, progress=tell)
         },
