@@ -31,6 +31,15 @@ if TYPE_CHECKING:
         low_pass_noise,
         unit_response,
     )
+    from .native import (
+        FunctionInC,
+        NativeLaw,
+        function_as_c,
+        interface_header,
+        native_of,
+        numbers,
+        recursion_as_c,
+    )
     from .plant import (
         DRIFT_BAND,
         ENCODER,
