@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .faults import FAULTS, PREFIX, fault_of, with_faults
     from .hermite import MotionBlock
     from .options import Option, WordOption
+    from .profile import Move, Profile
     from .record_file import RecordMotion
     from .scenario import Scenario
     from .scenarios import scenario_named, scenario_names, scenario_options

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .native import (
         FunctionInC,
         NativeLaw,
+        WithC,
         function_as_c,
         interface_header,
         native_of,

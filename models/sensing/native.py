@@ -26,14 +26,21 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import casadi as ca
 
 from ..basics import InputError
-from .control import HEARD, Controller, Recursion
+from .control import (
+    HEARD,
+    Controller,
+    ControllerAround,
+    Measurement,
+    Recursion,
+    recursion_of,
+)
 
 _INCLUDED = """\
 #ifndef {guard}
@@ -70,10 +77,34 @@ class NativeLaw:
         return tuple(name for name in self.files if name.endswith(".c"))
 
 
-def native_of(controller: Controller) -> NativeLaw | None:
-    """Return the C that does what a controller does, None if there is none."""
-    found = getattr(controller, "native", None)
-    return found if isinstance(found, NativeLaw) else None
+class WithC(ControllerAround):
+    """A controller in Python that knows its C, of which `make` writes that of a prefix."""
+
+    def __init__(self, controller: Controller, make: Callable[[str], NativeLaw]) -> None:
+        super().__init__(controller)
+        self._make = make
+
+    def as_c(self, prefix: str) -> NativeLaw:
+        """Return the C that does what `step` does."""
+        return self._make(prefix)
+
+    def step(self, measurement: Measurement, time: float) -> float:
+        """Return what the controller within commands [V, rad/s or N m]."""
+        return self._controller.step(measurement, time)
+
+
+def native_of(controller: Controller, prefix: str) -> NativeLaw | None:
+    """Return the C of a prefix that does what a controller does, None if there is none.
+
+    A recursion has one, and so has a controller with a method ``as_c(prefix)`` that says so.
+
+    Raises InputError if the prefix is no identifier of C.
+    """
+    recursion = recursion_of(controller)
+    if recursion is not None:
+        return recursion_as_c(recursion, prefix)
+    make = getattr(controller, "as_c", None)
+    return None if make is None else make(checked_prefix(prefix))
 
 
 def recursion_as_c(recursion: Recursion, prefix: str) -> NativeLaw:
@@ -161,9 +192,7 @@ def interface_header(prefix: str, memory: str, *, about: str = "", commanded: bo
 
     `about` is a comment that it begins with, `memory` the typedef of ``prefix_memory``.
     """
-    more = (
-        f"\nvoid {prefix}_commanded({prefix}_memory *memory, double command);" if commanded else ""
-    )
+    told = f"\nvoid {prefix}_commanded({prefix}_memory *memory, double command);"
     body = f"""
 #define {prefix.upper()}_INPUTS {len(HEARD)}
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .brake import BrakeOn
     from .constant_tension import ConstantTension
     from .feed_forward import VelocityFeedForward
-    from .interface import STOPPING, operated
+    from .interface import STOPPING, highest_command, operated
     from .linear_feedback import FADE, LinearFeedback
     from .touch_down import touching_down
 else:

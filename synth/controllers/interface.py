@@ -36,7 +36,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -51,9 +51,13 @@ from models.sensing import (
     Controller,
     ControllerAround,
     Measurement,
+    NativeLaw,
     Recursion,
+    function_as_c,
     heard_by,
     holds_brake,
+    interface_header,
+    native_of,
     recursion_of,
 )
 
@@ -61,6 +65,7 @@ from ..structures import (
     DrumSpeedLoop,
     RecursiveController,
     Signals,
+    SteadyMotion,
     Stepper,
     make_recursion,
     signals_of,
@@ -123,16 +128,13 @@ def operated(
     if holds_brake(controller) or getattr(controller, "operated", False):
         return controller
     loop = DrumSpeedLoop.from_case(case, sample_time=controller.sample_time)
-    limits, motor = DriveLimits.from_case(case), loop.motor
-    peak = min(limits.torque, motor.torque_constant * limits.current)
-    most = peak / motor.torque_gain + motor.own_gain * limits.speed
     hears = heard_by(controller)
     deaf = case.sensors.telemetry.delay + 1.0 if hears & set(_MOVES) else math.inf
     if recursion is None and hasattr(controller, "status"):  # which knows it itself
         deaf = math.inf
     parts = _Interface(
         loop=loop,
-        most=min(most, limits.voltage),
+        most=highest_command(loop.motor, DriveLimits.from_case(case)),
         ramp=ramp,
         rate=rate,
         slew=slew * controller.sample_time,
@@ -147,6 +149,12 @@ def operated(
         recursion=_around(recursion, parts),
         masses=int(getattr(controller, "masses", 0)),
     )
+
+
+def highest_command(motor: SteadyMotion, limits: DriveLimits) -> float:
+    """Return the size of the command beyond which no drive within the limits gives more."""
+    peak = min(limits.torque, motor.torque_constant * limits.current)
+    return min(peak / motor.torque_gain + motor.own_gain * limits.speed, limits.voltage)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,9 +172,15 @@ class _Operated(ControllerAround):
 
     def __init__(self, controller: Controller, parts: _Interface) -> None:
         super().__init__(controller)
+        self._parts = parts
         before, after = parts.functions()
         self._asked = Stepper(before, np.zeros(parts.ASKED))
         self._given = Stepper(after, np.zeros(parts.GIVEN))
+
+    def as_c(self, prefix: str) -> NativeLaw | None:
+        """Return the C that does what `step` does, None where that of the law within is unknown."""
+        within = native_of(self._controller, f"{prefix}_within")
+        return None if within is None else _native_around(within, self._parts, prefix)
 
     @property
     def status(self) -> str:
@@ -197,6 +211,79 @@ class _Operated(ControllerAround):
         if commanded is not None:  # a law that compares it with what the drive follows
             commanded(command)
         return command
+
+
+def _native_around(law: NativeLaw, parts: _Interface, prefix: str) -> NativeLaw:
+    """Return the C of a law with the interface about it, by the steps of `_Operated`."""
+    within = law.prefix
+    before, after = (
+        function_as_c(function, f"{prefix}_{name}")
+        for function, name in zip(parts.functions(), ("asked", "given"), strict=True)
+    )
+    memory = f"""\
+#include "{within}.h"
+
+typedef struct {{
+  double asked[{parts.ASKED}], given[{parts.GIVEN}];
+  {within}_memory within;
+}} {prefix}_memory;"""
+    unseen = "\n".join(
+        f"  if (!(measured[{flag}] > 0.5)) {' '.join(f'shown[{i}] = NAN;' for i in of)}"
+        for flag, of in _SHOWN_BY.items()
+    )
+    usual = " || ".join(f"status == {int(_CODE[name])}" for name in _USUAL)
+    told = f"\n  {within}_commanded(&memory->within, command);" if law.commanded else ""
+    count = len(HEARD)
+    source = f"""\
+#include <math.h>
+#include <string.h>
+
+#include "{prefix}.h"
+
+{before.declaration}
+{after.declaration}
+
+void {prefix}_reset({prefix}_memory *memory) {{
+  memset(memory->asked, 0, sizeof memory->asked);
+  memset(memory->given, 0, sizeof memory->given);
+  {within}_reset(&memory->within);
+}}
+
+double {prefix}_step({prefix}_memory *memory, const double *measured) {{
+  double seen[{count + 1}], shown[{count}], next[{max(parts.ASKED, parts.GIVEN)}], reference[3];
+  double command = 0.0;
+  if (measured[{_RESET}] > 0.5) {prefix}_reset(memory);
+  memcpy(seen, measured, {count} * sizeof(double));
+  memcpy(shown, measured, {count} * sizeof(double));
+  seen[{count}] = memory->given[{parts.GIVEN - 1}];
+  {before.call(["memory->asked", "seen"], ["next", "reference"])}
+  memcpy(memory->asked, next, sizeof memory->asked);
+  memcpy(shown + {_AT.start}, reference, sizeof reference);
+  /* No number is what an estimator does without. */
+{unseen}
+  seen[{count}] = {within}_step(&memory->within, shown);
+  {after.call(["memory->given", "seen"], ["next", "&command"])}
+  memcpy(memory->given, next, sizeof memory->given);{told}
+  return command;
+}}
+
+int {prefix}_status(const {prefix}_memory *memory) {{
+  /* What the law says of itself counts before the drive's part. */
+  int own = {within}_status(&memory->within), status = (int)memory->given[{parts.GIVEN - 1}];
+  if ({usual}) {{
+    status = ({usual.replace("status", "own")}) ? status : own;
+  }}
+  return status;
+}}
+"""
+    files = {
+        f"{prefix}.h": interface_header(prefix, memory),
+        f"{prefix}.c": source,
+        f"{before.name}.c": before.source,
+        f"{after.name}.c": after.source,
+        **law.files,
+    }
+    return replace(law, prefix=prefix, files=files, commanded=False)
 
 
 def _around(recursion: Recursion, parts: _Interface) -> Recursion:

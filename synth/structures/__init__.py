@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         RecursiveController,
         Signals,
         Stepper,
+        at_rest,
         checked_sample_time,
         make_recursion,
         signals_of,
