@@ -29,6 +29,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 import casadi as ca
 
@@ -179,7 +180,9 @@ class FunctionInC:
 
 def function_as_c(function: ca.Function, name: str) -> FunctionInC:
     """Return a function of dense columns as C under a name."""
-    symbols = [ca.SX.sym(f"a{i}", function.numel_in(i)) for i in range(function.n_in())]
+    # What is made of calls stays so: written out it would be many times as long.
+    kind = cast("type[ca.SX]", ca.SX if function.is_a("SXFunction") else ca.MX)
+    symbols = [kind.sym(f"a{i}", function.numel_in(i)) for i in range(function.n_in())]
     named = ca.Function(name, symbols, [ca.densify(out) for out in function.call(symbols)])
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": False})
     generator.add(named)

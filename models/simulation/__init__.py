@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING
 from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
-    from .closed_loop import STATUS
+    from .closed_loop import STATUS, own_parameters
+    from .compiler import Compiler, find_compiler
+    from .integrate import braked_step, disturbances
     from .kernel import Kernel
     from .simulate import Progress, run_simulation
-    from .simulation import EASE, Simulation, SimulationOptions, prepare
+    from .simulation import (
+        EASE,
+        SimulatedPlant,
+        Simulation,
+        SimulationOptions,
+        prepare,
+        simulated_plant,
+    )
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

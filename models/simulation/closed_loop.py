@@ -128,7 +128,7 @@ def build_closed_loop(
     width = 3 * len(motions)
     ends = width * (step.substeps + 1)  # numbers of all motions at the ends of every step
     columns = ends + len(sensors.row) + len(FLAGS)
-    values = {**parameters, **_own_parameters(case, step.sample_time, hold)}
+    values = {**parameters, **own_parameters(case, step.sample_time, hold)}
 
     # Many steps as calls of one function compile many times faster than written out, and run
     # faster too; one or two are faster written out.
@@ -268,7 +268,8 @@ def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Functi
     return ca.Function(name, inputs, dense, ["s", "r", "p"], ["s_next", "out"])
 
 
-def _own_parameters(case: Case, sample_time: float, hold: float) -> dict[str, float]:
+def own_parameters(case: Case, sample_time: float, hold: float) -> dict[str, float]:
+    """Return the parameters of command, brake and motor that come after the plant's, by name."""
     motor, brake = case.winch.motor, case.winch.brake
     capacity = None if brake is None else brake.torque
     # "holds whatever comes": ten times the largest torque that motor or static load can make

@@ -22,10 +22,12 @@ import stat
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..basics import SolverError, cache_folder, keep_latest
+from ..sensing import NativeLaw
 
 # No fast-math and no fused multiply-add: the compiled recursion must give the same numbers as
 # CasADi's virtual machine.  Hidden symbols cannot clash with those of another library.
@@ -81,17 +83,26 @@ def _version(command: tuple[str, ...], changed: int, size: int) -> str | None:
     return _first_line(answer.stdout) if answer.returncode == 0 else None
 
 
-def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:
-    """Return a whole C source as a loaded library, from the cache if it was compiled before.
+def load_library(
+    source: str | Mapping[str, str], compiler: Compiler, law: NativeLaw | None = None
+) -> ctypes.CDLL:
+    """Return C sources as one loaded library, from the cache if they were compiled before.
 
-    Symbols to be found must be exported, the rest stays hidden.
+    One whole source, or the texts of sources and headers by their names, with what a `law` among
+    them has copied and linked.  Symbols to be found must be exported, the rest stays hidden.
 
     Raises SolverError if the compiler fails or its library cannot be loaded; its first words are
     quoted.
     """
-    flags = FLAGS if len(source) < LONG_SOURCE else ("-O1", *FLAGS[1:])
+    files = {_SOURCE_NAME: source} if isinstance(source, str) else dict(source)
+    copied = {} if law is None else {name: path.read_bytes() for name, path in law.copied.items()}
+    links = () if law is None else law.links
+    longest = max(map(len, files.values()))
+    flags = FLAGS if longest < LONG_SOURCE or law is not None else ("-O1", *FLAGS[1:])
     machine = f"{platform.system()} {platform.machine()}"  # homes are shared between machines
-    parts = (source, machine, compiler.version, *compiler.command, *flags)
+    texts = (source,) if isinstance(source, str) else [t for pair in files.items() for t in pair]
+    digests = [f"{name} {hashlib.sha256(data).hexdigest()}" for name, data in copied.items()]
+    parts = (*texts, *digests, machine, compiler.version, *compiler.command, *flags, *links)
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:40]
     reason: object = "no folder can be written to"
     for place in (_kept_folder, _own_folder):
@@ -101,7 +112,8 @@ def load_library(source: str, compiler: Compiler) -> ctypes.CDLL:
             if found is not None:
                 return found
             with tempfile.TemporaryDirectory(prefix="build-", dir=folder) as scratch:
-                built = _build(source, compiler, flags, Path(scratch))
+                contents = {name: text.encode() for name, text in files.items()} | copied
+                built = _build(contents, compiler, flags, links, Path(scratch))
                 built.chmod(0o700)
                 library = folder / _name(key, built.read_bytes())
                 os.replace(built, library)
@@ -134,11 +146,21 @@ def _load_kept(folder: Path, key: str) -> ctypes.CDLL | None:
     return None
 
 
-def _build(source: str, compiler: Compiler, flags: tuple[str, ...], folder: Path) -> Path:
+def _build(
+    contents: Mapping[str, bytes],
+    compiler: Compiler,
+    flags: tuple[str, ...],
+    links: tuple[str, ...],
+    folder: Path,
+) -> Path:
     """Return the library, compiled in a folder that holds nothing else."""
-    (folder / _SOURCE_NAME).write_text(source, encoding="utf-8", newline="\n")
+    for name, content in contents.items():
+        place = folder / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(content)
     built = folder / f"kernel{_suffix()}"
-    command = (*compiler.command, *flags, "-o", built.name, _SOURCE_NAME, "-lm")
+    sources = [name for name in contents if name.endswith(".c")]
+    command = (*compiler.command, *flags, "-o", built.name, *sources, *links, "-lm")
     try:
         answer = _run(command, folder, TIME_LIMIT)
     except (OSError, subprocess.SubprocessError) as error:

@@ -28,6 +28,7 @@ from ..basics import FloatArray, SolverError, check_range, check_seed
 from ..run import Accumulator, Event, Run, Timings
 from ..sensing import STATUSES, Measurement, holds_brake
 from .closed_loop import STATUS
+from .native_loop import HELD, NativeLoop
 from .simulation import Simulation
 from .trips import Watch, trip_limits
 
@@ -81,7 +82,7 @@ def run_simulation(
     )
     store = _Store(dt, samples, options.store_step)
     rows = simulation.rows(check_seed(owner, seed), wanted)
-    stepper = (_Stepper if simulation.fused else _FromPython)(simulation)
+    stepper = _stepper(simulation)
     foresee = getattr(simulation.controller, "foresee", None)
     if foresee is not None:  # a controller with perfect preview, for reference
         foresee(rows.motions[0])
@@ -186,11 +187,14 @@ class _Stepper:
         return after, log, trip
 
     def _look(self, log: FloatArray, first: int) -> None:
-        """Count what the steps of a controller in the loop were, and tell of the first."""
+        """Look at what the steps of the controller in the loop were."""
         if self._told is None:
-            codes = np.where(log[:, self._age] > self._deaf, _BLIND, 0.0)
+            self._count(np.where(log[:, self._age] > self._deaf, _BLIND, 0.0), first)
         else:
-            codes = log[:, self._told]
+            self._count(log[:, self._told], first)
+
+    def _count(self, codes: FloatArray, first: int) -> None:
+        """Count the statuses of steps, and tell of the first of each."""
         if not codes.any():
             return
         for code in np.unique(codes[np.isfinite(codes)]):
@@ -206,6 +210,46 @@ class _Stepper:
             told = f"{STATUSES[status]} (told once)"
             self.events.append(Event(time=time, kind="controller", text=told))
         self.statuses[status] = self.statuses.get(status, 0) + count
+
+    def _held(self, kind: str, time: float, text: str, count: int = 1) -> None:
+        """Count commands that were not used, and tell of the first."""
+        if kind not in self.fallbacks:
+            told = f"{text}: the command before is held (told once)"
+            self.events.append(Event(time=time, kind="controller", text=told))
+        self.fallbacks[kind] = self.fallbacks.get(kind, 0) + count
+
+
+class _FromC(_Stepper):
+    """The controller is C of its own between the two halves of a sample (`NativeLoop`)."""
+
+    @override
+    def run(self, state: FloatArray, rows: FloatArray, parameters: FloatArray, first: int) -> Ran:
+        (kernel,) = self._kernels
+        after, both = kernel.run(state, rows, parameters)
+        found = None if self.watch is None else self.watch.trip(both[:, :-2], first)
+        trip = None
+        if found is not None:
+            row, trip = found
+            after, both = kernel.run(state, rows[: row + 1], parameters)
+        codes, seconds = both[:, -2], both[:, -1]
+        held = codes >= HELD
+        if held.any():
+            time = (first + int(np.argmax(held))) * self._sample_time
+            self._held("not a number", time, "the controller returned no number", int(held.sum()))
+        self._count(np.where(held, codes - HELD, codes), first)
+        if math.isfinite(float(seconds.sum())):
+            self.seconds.extend(seconds.tolist())
+        return after, np.ascontiguousarray(both[:, :-2]), trip
+
+
+def _stepper(simulation: Simulation) -> _Stepper:
+    if not simulation.fused:
+        return _FromPython(simulation)
+    return (
+        _FromC(simulation)
+        if isinstance(simulation.kernels[0], NativeLoop)
+        else _Stepper(simulation)
+    )
 
 
 class _FromPython(_Stepper):
@@ -223,7 +267,7 @@ class _FromPython(_Stepper):
 
     @override
     def run(self, state: FloatArray, rows: FloatArray, parameters: FloatArray, first: int) -> Ran:
-        measure, advance = self._kernels
+        measure, advance = self._kernels  # type: ignore[misc]
         log = np.empty((len(rows), len(self._signals)))
         for k, row in enumerate(rows):
             state, seen = measure.step(state, row, parameters)
@@ -261,13 +305,6 @@ class _FromPython(_Stepper):
         """What the last step was; as usual if the controller does not say, or not in our words."""
         status = str(getattr(self._controller, "status", ""))
         return status if status in STATUSES else _NAMES[0]
-
-    def _held(self, kind: str, time: float, text: str) -> None:
-        """Count a command that was not used, and tell of the first."""
-        if kind not in self.fallbacks:
-            told = f"{text}: the command before is held (told once)"
-            self.events.append(Event(time=time, kind="controller", text=told))
-        self.fallbacks[kind] = self.fallbacks.get(kind, 0) + 1
 
 
 class _DivergedError(Exception):

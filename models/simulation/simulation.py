@@ -33,20 +33,25 @@ from ..run import Run
 from ..sensing import (
     Controller,
     MruModel,
+    NativeLaw,
     SensorModel,
     TelemetrySchedule,
     holds_brake,
+    native_of,
     recursion_of,
 )
 from .closed_loop import HOOK, LoopRecursion, build_closed_loop
+from .compiler import find_compiler
 from .integrate import StepChoice, choose_step
 from .kernel import Kernel
+from .native_loop import NativeLoop
 from .rows import RowMaker
 
 EASE = 30.0  # in which the hook's motion grows where the controller is engaged from the start [s]
 _CLOSING_TIME = 0.3  # of a brake that the case says nothing about [s]
 _TRAVELS = 1.0  # a payload that is moved by more takes up rope and layers of the drum [m]
 _HEAVE_SAMPLE = (600.0, 0.1)  # what a record's rms is taken over: duration and step [s]
+_PREFIX = "controller"  # of the C of a controller in the loop
 _GEAR_TURN = 1.0  # motor speed over which the gear's losses change sides [rad/s]
 
 
@@ -92,15 +97,15 @@ class Simulation:
     hook: MotionSource  #: Where the hook's motion comes from.
     loop: LoopRecursion  #: The recursion of one sample.
     #: What runs it: one kernel with the controller inside, or two, of what comes before the
-    #: controller and of what comes after.
-    kernels: tuple[Kernel, ...]
+    #: controller and of what comes after, between which it is called from Python.
+    kernels: tuple[Kernel, ...] | tuple[NativeLoop]
     sensors: SensorModel  #: What the controller sees.
     schedule: Schedule
     rest: OperatingPoint  #: The plant at rest.
 
     @property
     def fused(self) -> bool:
-        """Whether the controller is part of the recursion."""
+        """Whether no sample goes through Python: the controller is part of what is compiled."""
         return len(self.kernels) == 1
 
     @property
@@ -284,33 +289,32 @@ def prepare(
     sample_time = check_range(
         controller.name, "sample_time", controller.sample_time, low=0.0, unit="s", open_low=True
     )
-    limits = DriveLimits.from_case(case) if options.limits is None else options.limits
-    masses = options.masses
-    if masses is None:
-        # A loop that reaches the rope's higher modes holds where these are, and few masses have
-        # them elsewhere.
-        data, least = PlantData.from_case(case), int(getattr(controller, "masses", 0))
-        masses = least if data.masses is None and least > data.chosen_masses() else None
-    surroundings = scenario.surroundings
-    travel = DrumTravel.from_case(case) if _travels(scenario) else None
-    plant = build_plant(case, masses, limits=limits, travel=travel, surroundings=surroundings)
-    rest = _rest(case, masses, surroundings)  # without limits, which rest must not depend on
-    values = _parameters(case, plant, options.parameters or {})
-    choice = _choose_step(plant, rest, values, sample_time, options.step, surroundings)
+    made = simulated_plant(
+        case, sample_time, scenario, options, least=int(getattr(controller, "masses", 0))
+    )
     sensors = SensorModel.from_case(case, sample_time, scenario.telemetry_delays)
     recursion = recursion_of(controller)
+    law = None if recursion is not None else _law_in_c(controller, options)
     knows = hasattr(controller, "status") if recursion is None else recursion.status is not None
     loop = build_closed_loop(
         case,
-        plant,
+        made.plant,
         sensors,
-        step=choice,
-        parameters=values,
-        start=_initial_state(plant, rest, scenario),
-        hold=rest.command,
+        step=made.step,
+        parameters=made.parameters,
+        start=made.start,
+        hold=made.rest.command,
         recursion=recursion,
         with_status=knows and scenario.operated,
     )
+    kernels: tuple[Kernel, ...] | tuple[NativeLoop]
+    if law is not None:
+        measure, advance = loop.functions
+        native = NativeLoop(measure, advance, law, command=made.rest.command)
+        loop = replace(loop, initial=np.concatenate([loop.initial, native.start()]))
+        kernels = (native,)
+    else:
+        kernels = tuple(Kernel(function, compiled=options.compiled) for function in loop.functions)
     return Simulation(
         case=case,
         controller=controller,
@@ -318,10 +322,66 @@ def prepare(
         options=options,
         hook=SpectrumMotion.from_case(case) if options.hook is None else options.hook,
         loop=loop,
-        kernels=tuple(Kernel(function, compiled=options.compiled) for function in loop.functions),
+        kernels=kernels,
         sensors=sensors,
         schedule=Schedule(scenario=scenario, sample_time=sample_time),
+        rest=made.rest,
+    )
+
+
+def _law_in_c(controller: Controller, options: SimulationOptions) -> NativeLaw | None:
+    """Return the C of a controller that would else be called from Python, where that can be used.
+
+    What is to be stopped at a deadline is called from Python all the same.
+    """
+    if options.compiled is False or options.deadline is not None or find_compiler() is None:
+        return None
+    return native_of(controller, _PREFIX)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulatedPlant:
+    """The plant that a simulation integrates; `simulated_plant` makes it."""
+
+    plant: Plant  #: With the limits of its drive.
+    rest: OperatingPoint  #: The load at rest, the drive without limits.
+    parameters: Mapping[str, float]  #: Values of the plant's parameters by name.
+    step: StepChoice  #: The integration step, and what set it.
+    start: FloatArray  #: State before anything moves, (nx,).
+
+
+def simulated_plant(
+    case: Case,
+    sample_time: float,
+    scenario: Scenario,
+    options: SimulationOptions,
+    *,
+    least: int = 0,
+) -> SimulatedPlant:
+    """Return the plant of a case as a simulation integrates it, the sample time given [s].
+
+    It has as many masses along the rope as the options say, or at least so many.
+
+    Raises InputError, SolverError as `prepare`.
+    """
+    limits = DriveLimits.from_case(case) if options.limits is None else options.limits
+    masses = options.masses
+    if masses is None:
+        # A loop that reaches the rope's higher modes holds where these are, and few masses have
+        # them elsewhere.
+        data = PlantData.from_case(case)
+        masses = least if data.masses is None and least > data.chosen_masses() else None
+    surroundings = scenario.surroundings
+    travel = DrumTravel.from_case(case) if _travels(scenario) else None
+    plant = build_plant(case, masses, limits=limits, travel=travel, surroundings=surroundings)
+    rest = _rest(case, masses, surroundings)  # without limits, which rest must not depend on
+    values = _parameters(case, plant, options.parameters or {})
+    return SimulatedPlant(
+        plant=plant,
         rest=rest,
+        parameters=values,
+        step=_choose_step(plant, rest, values, sample_time, options.step, surroundings),
+        start=_initial_state(plant, rest, scenario),
     )
 
 

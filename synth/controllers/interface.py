@@ -228,7 +228,7 @@ typedef struct {{
   {within}_memory within;
 }} {prefix}_memory;"""
     unseen = "\n".join(
-        f"  if (!(measured[{flag}] > 0.5)) {' '.join(f'shown[{i}] = NAN;' for i in of)}"
+        f"  if (!(measured[{flag}] > 0.5)) {' = '.join(f'shown[{i}]' for i in of)} = NAN;"
         for flag, of in _SHOWN_BY.items()
     )
     usual = " || ".join(f"status == {int(_CODE[name])}" for name in _USUAL)

@@ -11,6 +11,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .blocks import series
+    from .broken_loop import BrokenLoop, margins_of, sampled_margins
     from .drum_speed import DrumSpeedLoop, SteadyMotion
     from .fixed import Fixed
     from .low_order import LowOrder, LowOrderFeedback, LowOrderLaw

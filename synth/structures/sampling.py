@@ -29,7 +29,7 @@ import scipy.linalg
 from models.basics import ComplexArray, FloatArray, InputError, SynthesisError
 from models.case import Case
 from models.plant import MEAN_LOSSES, MEASUREMENTS, LinearPlant, Plant, zero_order_hold
-from models.sensing import HEARD, Measurement, Recursion, with_sensors
+from models.sensing import HEARD, LOAD, Measurement, Recursion, with_loads, with_sensors
 
 from ..loop import LinearController
 from .recursive import at_rest
@@ -169,14 +169,19 @@ def sampled_loop(
     sample_time: float,
     *,
     drag: float = 0.0,
+    friction: float = 0.0,
 ) -> SampledLoop:
     """Return the loop of a recursion on the linearised plant of a case.
 
     The recursion is the controller, of sample time T [s]; the case gives the sensors.  `drag` is
-    the linear drag of the payload [N s/m]; none is the harder test of stability.
+    the linear drag of the payload [N s/m]; none is the harder test of stability.  `friction` is
+    viscous friction at the motor, beside its own [N m s/rad].
     """
     cell, waits = case.sensors.load_cell, case.winch.drive.command_delay
-    sensed = with_sensors(plant.linearise(drag=drag), case.sensors, waits)
+    linear = plant.linearise(drag=drag)
+    if friction > 0.0:
+        linear = with_loads(linear, plant.data).with_element("motor.speed", LOAD, -friction)
+    sensed = with_sensors(linear, case.sensors, waits)
     return SampledLoop(
         plant=sensed.select(measurements=MEASUREMENTS).with_held_states(),
         recursion=recursion,
