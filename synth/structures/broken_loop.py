@@ -15,6 +15,10 @@ are held between messages are the plant's rational model of that, `LinearPlant.w
 The loop is broken between command and drive.  What the recursion hears as `drive.applied` stays
 the command asked for at the sample before, as the drive is taken to follow: anti-windup is silent,
 and the margins can be held against those of the continuous loop.
+
+Poles and gain are exact for the linear plant with its rational model of held readings, and so are
+M_s and the gain margins.  The delay margin is exact for further delays of whole samples; of a share
+of a sample what sampling folds would differ.
 """
 
 from __future__ import annotations
@@ -26,9 +30,16 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import ComplexArray, FloatArray
+from models.basics import ComplexArray, FloatArray, InputError
 from models.case import Case
-from models.plant import MEASUREMENTS, build_plant, late_hold, zero_order_hold
+from models.plant import (
+    MEASUREMENTS,
+    Resolvent,
+    Transfer,
+    build_plant,
+    late_hold,
+    zero_order_hold,
+)
 from models.sensing import HEARD, Recursion
 
 from ..loop import Margins, frequency_grid, loop_margins
@@ -36,7 +47,9 @@ from .sampling import ON_CIRCLE, WINCH, SampledLoop, sampled_loop
 
 _APPLIED = HEARD.index("drive.applied")
 _GONE = 1e-12  # size of an eigenvalue that is a delay's, which has no frequency
-_PER_DECADE = 100  # points of the grid's own up to half the sampling rate
+_REAL = 1e-9  # angle of an eigenvalue that is real
+# Points of a grid: to a decade, to a turn of the latest signal by one radian, and on even places.
+_PER_DECADE, _PER_RIPPLE, _FEWEST, _MOST = 100, 3, 100, 20000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,14 +62,22 @@ class BrokenLoop:
     def gain(self, omega: FloatArray) -> ComplexArray:
         """Return L at frequencies up to half the sampling rate [rad/s], (k,)."""
         z = np.exp(1j * np.asarray(omega, dtype=np.float64) * self.loop.sample_time)
+        of_plant, of_law = self._transfers
+        shown, heard = of_plant(z), of_law(z)
+        if shown is None or heard is None:
+            raise InputError("sampled loop: the gain is asked for at a pole of plant or controller")
+        direct = [row.on_command + row.on_last / z for row in self._rows]
+        late = [z ** (-row.samples) for row in self._rows]
+        shown = (shown[:, :, 0].T + direct) * late if self._rows else shown[:, :, 0].T
+        return np.asarray(-np.sum((heard[:, 0] + self._law[3][0]).T * shown, axis=0))
+
+    @cached_property
+    def _transfers(self) -> tuple[Transfer, Transfer]:
+        """From z to what the plant's states show of a command, and the law's command of that."""
         Phi, Gamma = self._plant[:2]
-        moved = _resolved(Phi, Gamma, z)[:, :, 0]
-        shown = np.empty((z.size, len(self._rows)), dtype=np.complex128)
-        for i, row in enumerate(self._rows):
-            shown[:, i] = (moved @ row.on_state + row.on_command + row.on_last / z) / z**row.samples
-        A, B, C, D = self._law
-        heard = np.einsum("ij,kjm->km", C, _resolved(A, B, z)) + D
-        return np.asarray(-np.sum(heard * shown, axis=1))
+        A, B, C, _ = self._law
+        rows = np.array([row.on_state for row in self._rows]).reshape(-1, len(Phi))
+        return Resolvent(Phi).between(rows, Gamma), Resolvent(A).between(C, B)
 
     @cached_property
     def poles(self) -> ComplexArray:
@@ -80,24 +101,38 @@ class BrokenLoop:
 
     @cached_property
     def matrix(self) -> FloatArray:
-        """What one sample does to (plant, last command, signals on their way, controller)."""
+        """What one sample does to (plant, last command, signals and command on their way, law)."""
         Phi, Gamma = self._plant[:2]
         A, B, C, D = self._law
         n, rows = len(Phi), self._rows
-        first = n + 1 + np.cumsum([0, *(row.samples for row in rows)])
-        size = int(first[-1])
+        # What all signals are late by, the command may be instead: fewer numbers are on their way.
+        common = min((row.samples for row in rows), default=0)
+        first = n + 1 + np.cumsum([0, *(row.samples - common for row in rows)])
+        inner = int(first[-1])
+        size = inner + common
         over, by, shown = np.zeros((size, size)), np.zeros((size, 1)), np.zeros((len(rows), size))
-        over[:n, :n], by[:n], by[n] = Phi, Gamma, 1.0
+        enters = np.zeros((size, 1))  # the command that the plant sees
+        enters[:n], enters[n], over[:n, :n] = Gamma, 1.0, Phi
         for i, row in enumerate(rows):
-            now = np.zeros(size)
-            now[:n], now[n] = row.on_state, row.on_last
             start, end = int(first[i]), int(first[i + 1])
-            if start == end:
-                shown[i] = now
-                continue
-            over[start], by[start] = now, row.on_command
-            over[range(start + 1, end), range(start, end - 1)] = 1.0
-            shown[i, end - 1] = 1.0
+            if start == end and row.on_command == 0.0:
+                shown[i, :n], shown[i, n] = row.on_state, row.on_last
+            elif start == end:  # seen once the command is there, which is on its way itself
+                shown[i, :n], shown[i, size - 1] = row.on_state, row.on_command
+            else:
+                over[start, :n], over[start, n], enters[start] = (
+                    row.on_state,
+                    row.on_last,
+                    row.on_command,
+                )
+                over[range(start + 1, end), range(start, end - 1)] = 1.0
+                shown[i, end - 1] = 1.0
+        if common:
+            over[:, [size - 1]] += enters
+            over[range(inner + 1, size), range(inner, size - 1)] = 1.0
+            by[inner] = 1.0
+        else:
+            by = enters
         return np.block([[over + by @ D @ shown, by @ C], [B @ shown, A]])
 
     @cached_property
@@ -142,11 +177,13 @@ class BrokenLoop:
             return _Row(heard=heard, samples=samples, on_state=c, on_last=d, on_command=0.0)
         Phi, Gamma = zero_order_hold(*self._plant[2:], share * T)
         on_command = d + float(c @ Gamma[:, 0])
-        return _Row(heard=heard, samples=samples, on_state=c @ Phi, on_last=0.0, on_command=on_command)
+        return _Row(
+            heard=heard, samples=samples, on_state=c @ Phi, on_last=0.0, on_command=on_command
+        )
 
     @cached_property
     def _law(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """The recursion as A, B, C, D from what `_rows` show to the command, its last one a state."""
+        """The recursion as A, B, C, D from `_rows` to the command, whose last value is a state."""
         J, heard = self.loop.controller, [row.heard for row in self._rows]
         A = np.block(
             [
@@ -157,19 +194,27 @@ class BrokenLoop:
         B = np.vstack([J.into_measured[:, heard], J.on_measured[:, heard]])
         return A, B, np.hstack([J.on_state, J.on_measured[:, [_APPLIED]]]), J.on_measured[:, heard]
 
-    @property
+    @cached_property
     def grid(self) -> FloatArray:
         """Frequencies dense enough to see every peak and crossing [rad/s]."""
         T = self.loop.sample_time
         top = math.pi / T
+        latest = T * (1 + max((row.samples for row in self._rows), default=0))
         own = [self.poles, *(np.linalg.eigvals(M) for M in (self._plant[0], self._law[0]))]
         z = np.concatenate(own).astype(np.complex128)
-        poles = np.log(z[np.abs(z) > _GONE]) / T
-        grid = frequency_grid(poles)
-        count = int(_PER_DECADE * math.log10(top / grid[0])) + 2
-        even = np.geomspace(float(grid[0]), top, count)
-        grid = np.unique(np.concatenate([grid[grid < top * (1.0 - ON_CIRCLE)], even]))
-        return np.asarray(np.append(grid[grid < top * (1.0 - ON_CIRCLE)], top))
+        poles = np.asarray(np.log(z[np.abs(z) > _GONE]) / T, dtype=np.complex128)
+        # What decays within the delays is one of their many ripples: those an even grid sees.
+        slow = poles[(np.abs(poles.real) * latest < 1.0) | (np.abs(poles.imag) < _REAL / T)]
+        grid = frequency_grid(slow)
+        count = min(_MOST, max(_FEWEST, int(top * latest * _PER_RIPPLE)))
+        even = np.concatenate(
+            [
+                np.geomspace(grid[0], top, int(_PER_DECADE * math.log10(top / grid[0])) + 2),
+                np.linspace(top / count, top, count),
+            ]
+        )
+        below = np.concatenate([grid, even])
+        return np.append(np.unique(below[below < top * (1.0 - ON_CIRCLE)]), top)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -238,11 +283,3 @@ def margins_of(loops: Sequence[BrokenLoop]) -> Margins | None:
 
     grid = np.unique(np.concatenate([loop.grid for loop in loops]))
     return loop_margins(gains, grid, gains(grid))
-
-
-def _resolved(A: FloatArray, B: FloatArray, z: ComplexArray) -> ComplexArray:
-    """Return (z I - A)^-1 B at points z, (k, n, m)."""
-    if not len(A):
-        return np.zeros((z.size, 0, B.shape[1]), dtype=np.complex128)
-    right = np.broadcast_to(B.astype(np.complex128), (z.size, *B.shape))
-    return np.asarray(np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, right))
