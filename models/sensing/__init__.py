@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         FunctionInC,
         NativeLaw,
         WithC,
+        checked_prefix,
         function_as_c,
         interface_header,
         native_of,

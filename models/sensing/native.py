@@ -27,13 +27,13 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import cast
 
 import casadi as ca
 
-from ..basics import InputError
+from ..basics import FloatArray, InputError
 from .control import (
     HEARD,
     Controller,
@@ -43,6 +43,7 @@ from .control import (
     recursion_of,
 )
 
+_ROW = 6  # numbers on a line of a table
 _INCLUDED = """\
 #ifndef {guard}
 #define {guard}
@@ -69,6 +70,10 @@ class NativeLaw:
     #: of others with their licences.
     copied: Mapping[str, Path] = field(default_factory=dict)
     links: tuple[str, ...] = ()  #: Which of those are linked.
+    #: Tables that are long, by name, each of so many parts: a header of the files declares
+    #: ``extern const double *name[parts];``.  `written` defines them; a loop that is compiled here
+    #: hands them over as they are, as it would take a compiler long to read them.
+    tables: Mapping[str, tuple[FloatArray, ...]] = field(default_factory=dict)
     #: Whether `p_commanded` is there.
     commanded: bool = False
 
@@ -76,6 +81,24 @@ class NativeLaw:
     def sources(self) -> tuple[str, ...]:
         """Names of the files that are compiled."""
         return tuple(name for name in self.files if name.endswith(".c"))
+
+    @property
+    def written(self) -> NativeLaw:
+        """The law with its tables as sources too, each part in one of its own."""
+        files = dict(self.files)
+        for name, parts in self.tables.items():
+            names = [f"{name}_{k}" for k in range(len(parts))]
+            for one, part in zip(names, parts, strict=True):
+                files[f"{one}.c"] = (
+                    f"extern const double {one}[{part.size}];\n"
+                    f"const double {one}[{part.size}] = {{\n{_lines(part)}}};\n"
+                )
+            declared = "\n".join(f"extern const double {one}[];" for one in names)
+            files[f"{name}.c"] = (
+                f"{declared}\nextern const double *{name}[{len(parts)}];\n"
+                f"const double *{name}[{len(parts)}] = {{{', '.join(names)}}};\n"
+            )
+        return replace(self, files=files, tables={})
 
 
 class WithC(ControllerAround):
@@ -211,6 +234,11 @@ int {prefix}_status(const {prefix}_memory *memory);{told if commanded else ""}
 def numbers(values: Iterable[float]) -> str:
     """Return numbers as C that reads them back to the last bit."""
     return ", ".join(repr(float(value)) for value in values) or "0.0"
+
+
+def _lines(values: FloatArray) -> str:
+    flat = values.ravel().tolist()
+    return ",\n".join(numbers(flat[k : k + _ROW]) for k in range(0, len(flat), _ROW))
 
 
 def checked_prefix(prefix: str) -> str:

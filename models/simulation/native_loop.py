@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import hashlib
 from typing import Any
 
 import casadi as ca
@@ -57,6 +58,8 @@ static double now(void) {{
   return NAN;
 #endif
 }}
+
+{tables}
 
 SEEN long long stillhook_size(void) {{ return (long long)sizeof(kept); }}
 
@@ -132,6 +135,7 @@ class NativeLoop:
         first = function_as_c(measure, "stillhook_measure")
         second = function_as_c(advance, "stillhook_advance")
         driver = _DRIVER.format(
+            tables=_tables(law),
             law=law.prefix,
             nr=self._rows,
             ns=self.states,
@@ -143,6 +147,12 @@ class NativeLoop:
             measure_call=first.call(["state", "row", "p"], ["next", "measured"]),
             advance_call=second.call(["state", "asked", "p"], ["next", "log"]),
         )
+        # Where the tables lie, which the library is told before each use; they are part of what it
+        # is known by, as all who have it share it.
+        parts = [part for table in law.tables.values() for part in table]
+        self._tables = (ctypes.c_void_p * len(parts))(*(part.ctypes.data for part in parts))
+        told = "".join(hashlib.sha256(part).hexdigest() for part in parts)
+        driver += f"/* {told} */\n"
         sources = {"loop.c": driver, "measure.c": first.source, "advance.c": second.source}
         self._library = library = load_library({**law.files, **sources}, compiler, law)
         library.stillhook_size.restype = ctypes.c_longlong
@@ -158,6 +168,7 @@ class NativeLoop:
 
     def start(self) -> FloatArray:
         """Return what a controller that was reset remembers, as the end of a state."""
+        self._library.stillhook_tables(self._tables)
         memory = np.zeros(-(-self._library.stillhook_size() // 8))
         self._library.stillhook_reset(memory.ctypes.data, self._command)
         return memory
@@ -175,6 +186,7 @@ class NativeLoop:
         assert given.shape[1:] == (self._rows,)
         assert p.shape == (self._parameters,)
         out = np.empty((len(given), self.outputs + 2))
+        self._library.stillhook_tables(self._tables)
         for first in range(0, len(given), BLOCK):  # so that Python gets a chance to see Ctrl-C
             some, its = given[first : first + BLOCK], out[first : first + BLOCK]
             self._library.stillhook_loop(
@@ -186,3 +198,14 @@ class NativeLoop:
                 its.ctypes.data,
             )
         return np.concatenate([moving, memory]), out
+
+
+def _tables(law: NativeLaw) -> str:
+    """Return the C that defines a law's tables, and takes where they lie."""
+    defined = [f"const double *{name}[{len(parts)}];" for name, parts in law.tables.items()]
+    taken = [
+        f"  for (k = 0; k < {len(parts)}; k++) {name}[k] = *all++;"
+        for name, parts in law.tables.items()
+    ]
+    lines = ["SEEN void stillhook_tables(const double *const *all) {", "  int k;", *taken]
+    return "\n".join([*defined, *lines, "  (void)all; (void)k;", "}"])

@@ -35,7 +35,7 @@ class Compiled:
     def __init__(self, law: NativeLaw, *, flags: tuple[str, ...] = EXACT) -> None:
         compiler = find_compiler()
         assert compiler is not None
-        size = f"{law.prefix}_bytes"
+        law, size = law.written, f"{law.prefix}_bytes"
         files: dict[str, bytes] = {name: text.encode() for name, text in law.files.items()}
         files |= {name: path.read_bytes() for name, path in law.copied.items()}
         more = f'#include "{law.prefix}.h"\nlong {size}(void);\nlong {size}(void) {{\n'

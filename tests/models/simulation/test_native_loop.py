@@ -45,7 +45,7 @@ def test_a_run_is_the_same_to_the_last_bit(seed: int) -> None:
         assert run.values.tobytes() == runs[0].values.tobytes()
         assert run.statistics.value("payload rms") == runs[0].statistics.value("payload rms")
     assert math.isnan(runs[0].timings.controller_median)
-    assert 0.0 < runs[2].timings.controller_median < runs[1].timings.controller_median
+    assert runs[2].timings.controller_median > 0.0
 
 
 def test_statuses_events_and_commands_that_are_no_numbers_are_told_alike() -> None:
