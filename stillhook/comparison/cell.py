@@ -214,7 +214,11 @@ class Prepared:
         if error is not None:
             up = error.maximum >= -error.minimum
             worst = error.maximum_time if up else error.minimum_time
-        counts = getattr(self._series.simulation.controller, "counts", None)
+        # One that ran as C has counted nothing itself; its statuses have been counted for it.
+        simulation = self._series.simulation
+        counts = getattr(simulation.controller, "counts", None)
+        if counts and simulation.fused:
+            counts = timings.statuses
         return Cell(
             contender=self._contender.name,
             height=self._height,

@@ -10,7 +10,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .contenders import ALL, CONTENDERS, DEFAULTS, DESIGNED, Contender, contenders_of, line_up
-    from .in_c import with_c
+    from .in_c import with_c, with_c_if_any
     from .named import CONTROLLER_TEXTS, controller_of
     from .recipe import Recipe, recipe_from, recipe_of
     from .stored_design import StoredDesign, design_law

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 
-from models.sensing import Controller, WithC
+from models.basics import InputError
+from models.sensing import Controller, WithC, native_of
 
 
 def with_c(controller: Controller) -> Controller:
@@ -19,3 +20,15 @@ def with_c(controller: Controller) -> Controller:
     from mpc.codegen import native_mpc
 
     return WithC(controller, functools.partial(native_mpc, controller))
+
+
+def with_c_if_any(controller: Controller) -> Controller:
+    """Return `with_c`, but a controller whose options have no C as it is."""
+    known = with_c(controller)
+    if known is controller:
+        return controller
+    try:
+        native_of(known, "law")
+    except InputError:
+        return controller
+    return known

@@ -26,10 +26,12 @@ from models.simulation import Progress, Simulation, SimulationOptions, prepare, 
 from synth.controllers import operated, touching_down
 from synth.design import Design, Tuning
 
-from ..controllers import controller_of
+from ..controllers import controller_of, with_c_if_any
 from ..text import number, quantity
 from .runs import FINER_SNAP, Runs, keep_worst, stays
 from .window import error_of
+
+_PAYS = 600.0  # length of a run that wins back what compiling a predictive controller takes [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,12 +47,16 @@ class Series:
         """Prepare, the controller made for the scenario's own case (`Scenario.case_for`).
 
         Where the scenario asks for it (`Scenario.operated`) it gets the interface (`operated`).
+        Linear predictive control runs as C in a run that is long enough to pay for the compiler.
 
         Raises InputError, SolverError as `models.simulation.prepare`.
         """
         if options.duration is not None:
             scenario = replace(scenario, duration=options.duration)
         own = scenario.case_for(case)
+        # A compiler takes its seconds over the C of a predictive controller.
+        if scenario.duration >= _PAYS and options.compiled is not False:
+            controller = with_c_if_any(controller)
         if scenario.operated:
             ramp = {"ramp": scenario.ramp} if scenario.ramp > 0.0 else {}
             controller = operated(controller, own, rate=scenario.rate, **ramp)
