@@ -22,7 +22,7 @@ STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline headline_page landing
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo bem waves cluster zarr report test test-ci test-all pythons lint bench docs studies holds clean
+.PHONY: help demo bem waves cluster zarr report export test test-ci test-all pythons lint bench docs studies holds clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F'\t' '{printf "make %-9s %s\n", $$1, $$2}'
@@ -39,6 +39,8 @@ cluster: $(VENV)/.installed-cluster  ## the extra for sweeps on a cluster
 zarr: $(VENV)/.installed-zarr  ## the extra for results as Zarr
 
 report: $(VENV)/.installed-report  ## the extra for reports as PDF
+
+export: $(VENV)/.installed-export  ## the extra for FMUs
 
 test: $(VENV)/.installed-dev  ## the tests of every change, within 6 minutes on two cores
 	$(PY) -m pytest $(PYTEST_ARGS)

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 
     from .comparison import Comparison, compare, write_comparison
     from .designs import load_design, save_design, write_design
+    from .exports import Export, export
     from .report import Revision, TitleBlock, write_report
     from .runs import FailureModes, Runs, failure_modes, simulate, write_runs
     from .seas import load_windows, save_windows

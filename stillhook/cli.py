@@ -62,6 +62,12 @@ COMMANDS = (
         "try a design or a controller on many cases: what is not known exactly, what fails",
     ),
     ("report", "study", "write all there is about a design as a report for clients: HTML and PDF"),
+    ("page", "design", "try gains, sea and limits with sliders, in the browser on this machine"),
+    (
+        "export",
+        "study",
+        "write a controller, or the plant, for drives, PLCs and co-simulation: C, FMU, IEC 61131-3",
+    ),
     ("scenarios", "run", "list the operations and the controllers"),
     ("bound", "design", "say what no linear controller can do better than"),
     ("sea", "world", "read wave spectra: what they hold, scatter diagram, one of them"),

@@ -10,7 +10,7 @@ from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .bound_text import bound_rows
-    from .design_file import design_data, design_text, load_design, save_design
+    from .design_file import design_data, design_text, is_design_file, load_design, save_design
     from .kept_design import best_design, keep_best
     from .motion import MotionView
     from .report import design_report, write_design

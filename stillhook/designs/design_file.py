@@ -120,6 +120,15 @@ def load_design(path: str | Path) -> Design:
     return design
 
 
+def is_design_file(path: str | Path) -> bool:
+    """Return whether a file is there that calls itself a design."""
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            return any(line.startswith((_KEY, _STRUCTURE)) for line in file)
+    except (OSError, ValueError):
+        return False
+
+
 def _complete(fields: Mapping[str, Any]) -> None:
     """Put the cases back that alternatives and members have in common with the design."""
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 class Exported:
     """What goes into one folder, all of it made before anything is written."""
 
-    kind: str  #: As it is asked for: ``c``, ``fmu``, ..
-    folder: str  #: Name of its folder within the export.
+    kind: str  #: As it is asked for: ``c``, ``fmu``, ..; its folder is called so.
     title: str  #: What it is, a heading.
     files: Mapping[str, str | bytes]  #: Content by path within the folder, without the README.
     about: str  #: What it is, how it is built and run: Markdown of the README.

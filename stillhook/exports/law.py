@@ -29,6 +29,13 @@ from synth.structures import SteadyMotion, at_rest
 
 from ..controllers import controller_of, with_c
 
+_NO_C = (
+    "export: {name} can be stepped from Python alone; what can be exported: linear laws, "
+    "feed-forward, constant tension, and linear predictive control (mpc)"
+)
+#: Controllers by name that are, which are not made to find that out.
+_FROM_PYTHON = ("mpc-clipped", "mpc-ar", "mpc-preview", "nonlinear-mpc")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
@@ -116,6 +123,8 @@ def law_of(
                 raise InputError(f"export: the design has no controller: {design.status}")
         if case is None:
             raise InputError("export: say which case the controller is for: case=...")
+    if wanted in _FROM_PYTHON:
+        raise InputError(_NO_C.format(name=wanted))
     options: dict[str, Any] = {"gains": gains} if gains is not None else {}
     inner = controller_of(wanted, case, sample_time=sample_time, **options)
     if holds_brake(inner):
@@ -127,10 +136,7 @@ def law_of(
     about = operated(with_c(inner), case, ramp=ramp, rate=rate, slew=slew)
     native = native_of(about, called)
     if native is None:
-        raise InputError(
-            f"export: {inner.name} can be stepped from Python alone; what can be exported: linear "
-            "laws, feed-forward, constant tension, and linear predictive control (mpc)"
-        )
+        raise InputError(_NO_C.format(name=inner.name))
     plant = build_plant(case)
     data, point = plant.data, plant.operating_point(MEAN_LOSSES)
     return Law(
@@ -138,7 +144,7 @@ def law_of(
         name=called,
         inner=inner,
         controller=about,
-        native=native,
+        native=native.written,
         recursion=recursion_of(about),
         design=design,
         unit=plant.units["drive.command"],

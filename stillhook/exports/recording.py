@@ -26,13 +26,13 @@ from .signals import SIGNALS
 EVENTS: tuple[tuple[float, str], ...] = (
     (2.0, "the operator enables the controller"),
     (10.0, "the set point rises by 0.3 m"),
+    (15.0, "the drive gives a little less torque than holds the load, for 1.5 s"),
     (20.0, "no message from the payload for 3 s"),
     (25.0, "the payload's sensors give no numbers for 1 s"),
     (28.0, "the motion reference unit is lost for 3 s"),
     (33.0, "the load cell is lost for 2 s"),
     (37.0, "the operator resets the controller"),
     (42.0, "the operator disables the controller for 2 s"),
-    (46.0, "the drive gives hardly more torque than holds the load, for 2 s"),
     (50.0, "the drum's encoder is lost for 0.5 s, and is back"),
     (55.0, "the drum's encoder is lost, and the brake set"),
 )
@@ -40,7 +40,7 @@ EVENTS: tuple[tuple[float, str], ...] = (
 
 _DURATION = 60.0  # [s]
 _TORQUE = "drive.torque_limit"
-_LEFT = 1.1  # of the static torque, where the drive gives hardly more
+_LEFT = 0.95  # of the static torque, where the drive gives hardly enough
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +83,7 @@ def record(law: Law, *, seed: int = 0) -> Recording:
         mru_outages=((28.0, 31.0),),
         load_cell_outages=((33.0, 35.0),),
         encoder_outages=((50.0, 50.5), (55.0, _DURATION)),
-        parameter_changes={46.0: {_TORQUE: left}, 48.0: {_TORQUE: None}},
+        parameter_changes={15.0: {_TORQUE: left}, 16.5: {_TORQUE: None}},
     )
     simulate(law.case, heard, scenario=scenario, seeds=[seed], duration=_DURATION)
     return heard.recording()

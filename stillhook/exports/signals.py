@@ -24,7 +24,7 @@ class Signal:
 
 _OF_LOAD = "the last value, with payload.valid 0 and payload.age growing"
 _OF_UNIT = "the last value, with mru.valid 0"
-_OF_DRUM = "anything, with encoder.valid 0"
+_OF_DRUM = "any number, with encoder.valid 0"
 
 _TOLD = {
     "payload.acceleration": ("m/s2", "payload's acceleration, up positive", _OF_LOAD),
@@ -52,7 +52,7 @@ _TOLD = {
     "rope.tension": (
         "N",
         "tension of the rope at the drum, its static part included",
-        "anything, with load_cell.valid 0",
+        "any number, with load_cell.valid 0",
     ),
     "motor.torque": (
         "N m",

@@ -26,6 +26,7 @@ LINES = (
     "sweep thesis-1975 --mode time --samples 2 --duration '20 s' --cluster local:1 --out out/dask",
     "report thesis-1975 --without comparison,operability,robustness,sweep,failures,simulation "
     "--no-bound",
+    "export thesis-1975 --to c,st",
     "scenarios",
     "bound thesis-1975",
     "sea thesis-1975",
