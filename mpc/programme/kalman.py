@@ -178,6 +178,7 @@ class SampledFilter:
         if self._heard < len(self._first) and not there.all():
             # What they hold of the constants would be lost on a steady gain.
             self._P, self._heard = self._start, len(self._first)
+            self._seen = self._spread = None  # of another covariance
         if self._heard < len(self._first):
             gain = self._first[self._heard]
             self._heard += 1

@@ -187,6 +187,7 @@ void mpc_filter_correct(mpc_filter *f, const double *ahead, const double *error,
     /* What they hold of the constants would be lost on a steady gain. */
     memcpy(f->P, mpc_start, sizeof f->P);
     f->heard = MPC_FIRST;
+    f->has_seen = f->has_spread = 0; /* of another covariance */
   }
   if (f->heard < MPC_FIRST)
     K = mpc_first_gains + (size_t)f->heard++ * N * NY;

@@ -372,3 +372,17 @@ def test_messages_that_are_lost_from_the_start_do_not_lose_the_load():
     case = models.load_case("subsea-crane").replace(lost)
     run = sh.simulate(case, LinearMPC(case), seeds=[0], duration=120.0, settle=40.0)[0]
     assert run.statistics["payload.displacement"].standard_deviation < 0.05
+
+
+def test_the_first_gain_after_an_interrupted_start_is_that_of_the_start(estimator):
+    estimator.reset()
+    there = np.ones(len(estimator._R), dtype=np.bool_)
+    there[:3] = False
+    asked = estimator.innovations  # as the gate asks, of the covariance that is usual
+    assert asked.shape == (len(there),)
+    error = 0.01 * np.sqrt(estimator._R)
+    estimator.correct(np.zeros(len(estimator.state)), error, there)
+    gain = kalman_gain(estimator._C, np.ones(len(there)), estimator._start, there)
+    expected = gain * estimator._back @ (error * there)
+    assert estimator.state == pytest.approx(expected, rel=1e-9, abs=1e-12 * np.abs(expected).max())
+    estimator.reset()
