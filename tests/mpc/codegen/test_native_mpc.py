@@ -129,6 +129,7 @@ class Player:
 
 def write(law: NativeLaw, folder: Path) -> None:
     """Write a law, and a function beside it that plays a record."""
+    law = law.written
     for name, text in law.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     for name, path in law.copied.items():
@@ -448,7 +449,7 @@ def test_no_step_leaves_its_memory(which, tmp_path):
     assert compiler is not None
     case, controller = REPLAYS[which].made()
     record = recorded(controller, case, troubled(case, 200.0), 200.0, 0.01)
-    law = native_mpc(controller, "winch")
+    law = native_mpc(controller, "winch").written
     flags = ("-std=c99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     (tmp_path / "empty.c").write_text("int main(void) { return 0; }\n")
     tried = [*compiler.command, *flags, "-o", "empty", "empty.c"]
