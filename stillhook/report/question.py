@@ -176,7 +176,7 @@ def _limiting(s: Sources, findings: Findings) -> Iterator[Sentence]:
     binding = findings.design.binding
     if binding:
         names = ", ".join(names_of(name) for name in binding)
-        yield s.say(f"What limits the design, dearest first: {names}.")
+        yield s.say(f"What limits the design, the highest price first: {names}.")
     place = f"{RESULTS}/reports/operability/status"
     if s.has(place):
         yield s.say("Operability: {}.", s.cite(place))

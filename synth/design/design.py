@@ -245,7 +245,7 @@ class Design:
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Names of the limits that have a price, dearest first."""
+        """Names of the limits that have a price, the highest first."""
         used = [u for u in self.limits.values() if u.price > _PRICED * self.payload_rms]
         return tuple(u.name for u in sorted(used, key=lambda u: -u.price))
 

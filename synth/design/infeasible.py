@@ -165,7 +165,7 @@ def _required(
 
 
 def _binding(problem: FamilyProblem, solved: Solution) -> list[str]:
-    """Return the drive limits that are used up at the largest sea, the dearest first.
+    """Return the drive limits that are used up at the largest sea, the highest price first.
 
     Not by their multipliers alone: of two limits that say nearly the same (torque and current
     of a DC motor) only one has a price, and relaxing that one would change nothing.

@@ -381,7 +381,7 @@ class GainProgramme:
         else:
             objective, slope = spread[0][0] - float(self._best[0]), spread[0][1]
         empty = np.zeros((0, self.size))
-        # The members that the objective hangs on: all in a mean, the dearest otherwise.
+        # The members that the objective hangs on: all in a mean, the worst otherwise.
         excess = np.array([c for c, _ in spread]) - self._best
         shares = np.exp((2.0 if self._mean else _HANGING) * (excess - excess.max()))
         curvature = np.zeros((self.size, self.size))

@@ -1,6 +1,6 @@
 """RAOs from ShipX (Veres): the `.re1` file, motion transfer functions.
 
-Six lines of text, then numbers: density and gravity; L_pp, B, T; LCG (abaft L_pp/2) and VCG (above
+Six lines of text, then numbers: density and gravity; L_pp, B, T; LCG (aft of L_pp/2) and VCG (above
 the baseline); how many speeds, headings, frequencies and modes; for each speed a line with the
 speed [m/s], sinkage, trim, and the x and z of the point whose motions follow; for each heading its
 line [deg]; for each frequency its line [rad/s] and a line of mode, real and imaginary part each.
@@ -114,7 +114,7 @@ def parse_shipx(owner: str, text: str, *, speed: float | None = None) -> VesselR
     direction = SHIPX.directions([row[1] for row in rows])
     table = SHIPX.complex_values([row[2] for row in rows], np.ones(len(rows)))
     w, b, values = grid(owner, omega, direction, table)
-    # Their x is abaft midships, their z above the baseline; ours are forward and above the water.
+    # Their x is aft of midships, their z above the baseline; ours are forward and above the water.
     origin = (-about[3], 0.0, about[4] - draught)
     notes = [
         f"ShipX .re1: {SHIPX.words()}; turned half a circle about z",

@@ -118,13 +118,13 @@ def _next(
             for name, value in design.required.items()
         ]
         rows.append(("a drive that can do it", f"{optimise} {' '.join(sets)}"))
-    dearest = max(design.limits.values(), key=lambda use: use.price, default=None)
-    if dearest is not None and dearest.price > 0.0 and design.ok:
-        bound = dearest.bound * (0.9 if dearest.name in AT_LEAST else 1.1)
+    highest = max(design.limits.values(), key=lambda use: use.price, default=None)
+    if highest is not None and highest.price > 0.0 and design.ok:
+        bound = highest.bound * (0.9 if highest.name in AT_LEAST else 1.1)
         rows.append(
             (
-                "the dearest limit, a tenth looser",
-                f"{optimise} --set {LIMITS[dearest.name][1]}={number(bound)} "
+                "the limit with the highest price, a tenth looser",
+                f"{optimise} --set {LIMITS[highest.name][1]}={number(bound)} "
                 f"--out {shlex.quote(str(folder.path) + '-looser')}",
             )
         )

@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     file = shlex.quote(str(table))
     following = [
         (
-            "a hook abaft to starboard, in waves from 30 deg to starboard of the bow",
+            "a hook aft and to starboard, in waves from 30 deg to starboard of the bow",
             f"stillhook motion subsea-crane --set vessel.raos={file} "
             "--set 'vessel.heading=150 deg' --set vessel.hook.x=-25 --set vessel.hook.y=-15",
         ),
