@@ -14,5 +14,6 @@ if TYPE_CHECKING:
     from .law import Law, law_of
     from .recording import EVENTS, Recording, record
     from .signals import SIGNALS, STATUS_TEXTS, Signal
+    from .state_space import to_python_control
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)
