@@ -27,6 +27,7 @@ SCRIPTS: Mapping[str, str] = {
     "landing_designs.csv": "docs/make/landing.py",
     "mpc_solvers.csv": "benchmarks/mpc_speed.py",
     "mpc_steps.csv": "benchmarks/mpc_speed.py",
+    "mpc_in_c.csv": "benchmarks/mpc_in_c.py",
     "other_seas.csv": "docs/make/other_seas.py",
     "outages.csv": "docs/make/outages.py",
     "outages_designs.csv": "docs/make/outages.py",

@@ -31,7 +31,7 @@ from ..text import number, quantity
 from .runs import FINER_SNAP, Runs, keep_worst, stays
 from .window import error_of
 
-_PAYS = 600.0  # length of a run that wins back what compiling a predictive controller takes [s]
+_PAYS = 1200.0  # length of a run that wins back what compiling a predictive controller takes [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -29,6 +29,12 @@ def series(controller: object, duration: float, **options: object) -> Series:
     )  # type: ignore[arg-type]
 
 
+@pytest.fixture(autouse=True)
+def pays_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let it pay from ten minutes on, so that the tests are short."""
+    monkeypatch.setattr("stillhook.runs.simulation._PAYS", 600.0)
+
+
 @needs_compiler
 def test_a_long_run_is_the_same() -> None:
     mpc = predictive()
