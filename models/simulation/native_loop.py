@@ -151,7 +151,7 @@ class NativeLoop:
         # is known by, as all who have it share it.
         parts = [part for table in law.tables.values() for part in table]
         self._tables = (ctypes.c_void_p * len(parts))(*(part.ctypes.data for part in parts))
-        told = "".join(hashlib.sha256(part).hexdigest() for part in parts)
+        told = "".join(hashlib.sha256(part.tobytes()).hexdigest() for part in parts)
         driver += f"/* {told} */\n"
         sources = {"loop.c": driver, "measure.c": first.source, "advance.c": second.source}
         self._library = library = load_library({**law.files, **sources}, compiler, law)

@@ -26,6 +26,7 @@ ALLOWED = 0.1
 """What sampling may take of the loop's distance to -1, which is 1/M_s, in that of the limit."""
 
 _SHORT = 1e-3  # at most, of times that leave a loop nearly as it is in continuous time [s]
+_MOST_LATE = 1500  # samples
 _LEAST = 3e-4  # no shorter sample time or step is asked for [s]
 # Ratios of the times that are tried, and of two that are the same to two digits.
 _RATIO, _CLOSE = 1.5, 1.01
@@ -154,7 +155,13 @@ def _sensitivity(law: Law, recursion: Recursion, sample_time: float, late: float
 
 
 def _resampled_sensitivity(law: Law, sample_time: float) -> float:
-    """Return M_s of a law at another sample time; infinite if there is none that is stable."""
+    """Return M_s of a law at another sample time; infinite if there is none that is stable.
+
+    A delay of thousands of samples is not looked at: each would be a state.
+    """
+    late = law.case.sensors.telemetry.delay + law.case.winch.drive.command_delay
+    if late > _MOST_LATE * sample_time:
+        return math.inf
     try:
         other = resampled(law.inner, law.case, sample_time)
     except (InputError, SynthesisError):

@@ -29,6 +29,7 @@ OF_GAINS = (
     "sweep CASE --samples 16 --vary payload.drag_coefficient=30%",
     "report CASE --no-bound --out out/report "
     "--without comparison,operability,sweep,sensitivity,robustness,failures,simulation",
+    "export CASE --to c,st,json",
 )
 IN_TIME = (
     "simulate CASE --duration '30 s' --controller feedback,none,feed-forward,constant-tension",
@@ -56,8 +57,19 @@ OF_THE_CRANE = (
 #: What takes minutes, as docs/mpc.md says: a telegram of 5 s ago is a model of hundreds of states.
 LONG = ("delay of 5 s", "--controller mpc")
 
-#: Commands that take no case of one's own with a load, a rope and a winch.
-NONE = ("scenarios", "sea", "vessel import", "vessel hull", "vessel list", "cases", "new", "schema")
+#: Commands that take no case of one's own with a load, a rope and a winch, and the one that serves
+#: until it is stopped.
+NONE = (
+    "page",
+    "scenarios",
+    "sea",
+    "vessel import",
+    "vessel hull",
+    "vessel list",
+    "cases",
+    "new",
+    "schema",
+)
 
 NOT_A_NUMBER = re.compile(r"(?<![\w.-])[+-]?(nan|inf|NaN|Infinity|None)(?![\w-])")
 
