@@ -15,14 +15,14 @@ PIP_INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check -c const
 
 # Each writes its rows, then its pages and figures; those that only draw come after.
 STUDIES := $(addprefix docs/make/,$(addsuffix .py,headline headline_page landing saturation \
-    random_starts robust structures comparison structures_page said_structures said_mpc \
+    random_starts robust structures validation comparison structures_page said_structures said_mpc \
     operability_figures windows_figures hook_motion sea_figures)) \
     benchmarks/sweep.py
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo bem waves cluster zarr report export test test-ci test-all pythons lint bench docs studies holds clean
+.PHONY: help demo bem waves cluster zarr report page export test test-page test-ci test-all pythons lint bench docs studies holds clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F'\t' '{printf "make %-9s %s\n", $$1, $$2}'
@@ -40,16 +40,24 @@ zarr: $(VENV)/.installed-zarr  ## the extra for results as Zarr
 
 report: $(VENV)/.installed-report  ## the extra for reports as PDF
 
+page: $(VENV)/.installed-page  ## the extra for the design page in the browser
+
 export: $(VENV)/.installed-export  ## the extra for FMUs
 
 test: $(VENV)/.installed-dev  ## the tests of every change, within 6 minutes on two cores
 	$(PY) -m pytest $(PYTEST_ARGS)
 
-test-ci: $(VENV)/.installed-dev  ## notebooks, pages, whole studies: what CI runs after those
-	$(PY) -m pytest -m "ci and not slow" $(PYTEST_ARGS)
+test-ci: $(VENV)/.installed-dev test-page  ## notebooks, pages, whole studies: what CI runs after those
+	$(PY) -m pytest -m "ci and not slow and not page" $(PYTEST_ARGS)
+
+# One after the other: what is timed and what moves shall not wait for a neighbour.
+test-page: $(VENV)/.installed-dev $(VENV)/.installed-page-test  ## the design page, driven in chromium
+	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null || \
+	    { apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium; }
+	$(PY) -m pytest -m page tests/stillhook/page
 
 test-all: $(VENV)/.installed-dev  ## all tests
-	$(PY) -m pytest -m "slow or not slow" $(PYTEST_ARGS)
+	$(PY) -m pytest -m "(slow or not slow) and not page" $(PYTEST_ARGS)
 
 # A Python is left out where its packages cannot be had; `.venv-3.X` stays.
 pythons: $(VENV)/.installed-dev  ## the same numbers on every later Python that is found
@@ -84,6 +92,7 @@ holds: $(VENV)/.installed-dev  ## simulate what is called ok, for 3 h each; take
 	$(PY) docs/make/holds_page.py
 
 docs: $(VENV)/.installed-docs  ## the documentation, into docs/_build/html
+	$(PY) docs/make/notebook_pages.py
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
