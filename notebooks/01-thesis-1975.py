@@ -25,7 +25,7 @@
 # payload $P$. $G = P/Y$ is the rope alone, $T = P/Z$ and $T_2 = X/Z$ are the closed loop.
 
 # %%
-"""Imports, a helper for tables, and the case."""
+"""Imports, and the case."""
 
 import math
 import sys
@@ -36,39 +36,45 @@ import numpy as np
 import thesis_tables as tables
 from cables import cable_study
 from feedback import with_feedback
-from IPython.display import Markdown
+from looks import AFTER, BEFORE, DRUM, HOOK, OTHERS, REFERENCE, say, table
 from time_response import Sine, Step, time_response
 
 import stillhook as sh
 from models import HookMotion, PlantData, build_plant, fixed_top_modes
-from models.basics import spectral_nodes
-from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.loop import LinearController, closed_loop_poles
-from synth.question import locked_response, pose
+from synth import LinearController, closed_loop_poles
 
 sys.path.insert(0, str(Path.cwd().parent / "docs" / "make"))
 import headline
 import headline_page
 
 # %matplotlib inline
-plt.rcParams.update(
-    {"figure.figsize": (8.0, 3.6), "figure.constrained_layout.use": True, "axes.grid": True}
-    | {"grid.color": "#d9d9d9", "axes.spines.top": False, "axes.spines.right": False}
-)
-
-
-def table(head, rows):
-    """Show rows of numbers or texts as a table."""
-    cells = [[v if isinstance(v, str) else f"{v:.4g}" for v in row] for row in rows]
-    lines = [
-        " | ".join(cell.replace("|", r"\|") for cell in line)
-        for line in (head, ["---:"] * len(head), *cells)
-    ]
-    return Markdown("\n".join(f"| {line} |" for line in lines))
-
-
 case = sh.load_case("thesis-1975")
 gains = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
+rest = {"color": REFERENCE, "lw": 1.0}
+
+fig, ax = plt.subplots(figsize=(8.0, 3.8))
+ax.fill([-6, -5, 3, 4.2, 4.2, -6], [6.0, 4.6, 4.6, 6.0, 6.4, 6.4], color=HOOK, alpha=0.5)
+waves = np.linspace(-8, 8, 200)
+ax.plot(waves, 5.3 + 0.25 * np.sin(1.6 * waves), color=AFTER, lw=1.2)
+ax.plot([2.5, 5.5], [6.4, 8.0], lw=3.0, color=HOOK)  # the boom
+ax.add_patch(plt.Circle((0.0, 6.9), 0.5, fill=False, color=DRUM, lw=2.0))
+ax.plot([0.35, 5.5, 5.5], [7.25, 8.0, 1.2], **rest)
+ax.fill([5.1, 5.9, 5.9, 5.1], [0.4, 0.4, 1.2, 1.2], color=BEFORE)
+for x, low, text, colour in (
+    (6.4, 7.3, "hook $Z$", HOOK),
+    (-0.9, 7.6, "drum $X$", DRUM),
+    (6.4, 0.4, "payload $P$", BEFORE),
+):
+    ax.annotate("", (x, low + 1.0), (x, low), arrowprops={"arrowstyle": "->", "color": colour})
+    ax.text(x + 0.2, low + 0.3, text, color=colour, ha="left")
+ax.annotate("", (-4.2, 6.9), (-0.5, 6.9), arrowprops={"arrowstyle": "<-", "color": DRUM})
+ax.text(-7.9, 6.8, "motor, $E_a$", color=DRUM)
+ax.plot([5.1, -3.4, -3.4], [0.8, 0.8, 6.8], color=AFTER, lw=1.0, ls="--")
+ax.text(-3.2, 1.0, r"fed back: $\ddot P$, $\dot P$, $P$", color=AFTER)
+ax.text(5.7, 3.6, "2000 m of rope", color=REFERENCE)
+ax.set(xlim=(-8, 9), ylim=(0, 9), title="What moves, and what is fed back")
+ax.set_axis_off()
+plt.show()
 
 # %% [markdown]
 # The figures that list the six cables are lost with the scan. The worst of them, for which the
@@ -137,8 +143,13 @@ print(f"hook: {1e3 * hook.displacement.rms:.0f} mm rms")
 # which holds whatever the gains because $Y = X + Z$.
 
 # %%
-question = pose(case)
-loop = question.assess(gains)
+thesis = sh.evaluate_gains(case, gains)
+loop = thesis.assessment
+
+
+def drum_held(omega, drag=C):
+    """P/Z with the drum held: the rope as one spring, the payload, its drag."""
+    return K / (K - M * omega**2 + 1j * drag * omega)
 
 
 def P_Z(omega):
@@ -190,7 +201,7 @@ table(
 # %% [markdown]
 # All within 7 %, the accuracy of a Bode plot read by eye. The table's $X/Z$ column is another
 # matter: it does not belong to eq. 34 above 1.3 rad/s (two of its entries are lost, so it has no
-# frequencies), and puts the peak at 4.12.
+# frequencies), and its peak is too low.
 
 # %%
 fine = np.linspace(7.5, 7.8, 3001)
@@ -199,10 +210,11 @@ print(
     "peak |P/Z| {1:.4f} at {0:.2f} rad/s, peak |X/Z| {3:.2f} at {2:.2f} rad/s".format(
         *peaks[0], *peaks[1]
     )
+    + "; the thesis's table has 4.12"
 )
 w = np.geomspace(0.08, 20, 1500)
 fig, ax = plt.subplots()
-ax.loglog(w, np.abs(locked_response(case, w, C)), color=BEFORE, label="|P/Z|, drum held")
+ax.loglog(w, np.abs(drum_held(w)), color=BEFORE, label="|P/Z|, drum held")
 ax.loglog(w, P_Z(w), color=AFTER, label="|P/Z|, thesis's gains")
 ax.loglog(w7, printed, "o", color=AFTER, ms=4, label="Table 7")
 ax.loglog(w, X_Z(w), color=DRUM, label="|X/Z|, thesis's gains")
@@ -218,7 +230,7 @@ plt.show()
 # %%
 rows = []
 for (w8, G2, *_), (_, T2, *_) in zip(tables.BEFORE, tables.AFTER, strict=True):
-    g = float(np.abs(locked_response(case, np.array([w8]), C))[0] ** 2)
+    g = float(np.abs(drum_held(w8)) ** 2)
     t = float(1e4 * P_Z([w8])[0] ** 2)
     rows.append([w8, G2, g, f"{100 * (g / G2 - 1):+.1f} %", T2, t, f"{100 * (t / T2 - 1):+.1f} %"])
 table(["ω", "|G|² Table 8", "ours", "off", "10⁴|T|² Table 9", "ours", "off"], rows)
@@ -227,7 +239,7 @@ table(["ω", "|G|² Table 8", "ours", "off", "10⁴|T|² Table 9", "ours", "off"
 w = np.linspace(0.4, 1.7, 1500)
 fig, ax = plt.subplots()
 ax.semilogy(w, 8 * hook.density(w), color=HOOK, label="hook")
-before = np.abs(locked_response(case, w, C)) ** 2 * hook.density(w)
+before = np.abs(drum_held(w)) ** 2 * hook.density(w)
 ax.semilogy(w, 8 * before, color=BEFORE, label="payload, drum held")
 ax.semilogy(w, 8 * P_Z(w) ** 2 * hook.density(w), color=AFTER, label="payload, thesis's gains")
 ax.semilogy(tables.BEFORE[1:, 0], tables.BEFORE[1:, 3], "o", color=BEFORE, ms=4, label="Table 8")
@@ -244,33 +256,40 @@ ax.set(
 ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 plt.show()
 
-# %% [markdown]
-# Integrated over the whole sea this is 11.7 mm after against 5.99 m before. The latter is no
-# motion that could ever be seen: its $C$ belongs to an amplitude of 0.12 m, fifty times less.
-# With drag that agrees with the motion ($C_D$ = 1.05, 20 m²) the payload moves 1.53 m with the
-# drum held, 2.6 times the hook.
-
 # %%
-own_drag = pose(case.replace({"payload.drag": {"method": "stochastic"}}))
+own_drag = sh.evaluate_gains(case.replace({"payload.drag": {"method": "stochastic"}}), gains)
 table(
     ["payload rms", "C [N s/m]", "[mm]"],
     [
-        ["drum held, the thesis's C", C, 1e3 * question.payload_rms_before],
+        ["drum held, the thesis's C", C, 1e3 * thesis.payload_rms_before],
         ["drum held, consistent C", own_drag.drag_before, 1e3 * own_drag.payload_rms_before],
         ["thesis's gains", C, 1e3 * loop.sigma("payload.displacement")],
     ],
+)
+
+# %% tags=["hide-input"]
+shape = own_drag.case.payload
+say(
+    f"Integrated over the whole sea this is {1e3 * thesis.payload_rms:.1f} mm after against "
+    f"{thesis.payload_rms_before:.2f} m before. The latter is no motion that could ever be seen: "
+    "its $C$ belongs to an amplitude of 0.12 m, fifty times less. With drag that agrees with the "
+    f"motion (the load of {shape.area:g} m², drag coefficient 1.05) the payload moves by "
+    f"{own_drag.payload_rms_before:.2f} m with the drum held, "
+    f"{own_drag.payload_rms_before / own_drag.hook_rms:.1f} times the hook."
 )
 
 # %% [markdown]
 # ## 4. Ten per cent more of each gain: Figure 32
 #
 # The thesis judged its gains' sensitivity by the payload's motion, which hardly moves. The margin
-# does: $M_s$, the peak of the sensitivity $|1/(1+L)|$, goes from 5.15 to between 4.8 and 5.9.
+# does: $M_s$, the peak of the sensitivity $|1/(1+L)|$.
 
 # %%
 rows = []
 for name in ("nothing", "a", "a1", "a2"):
-    changed = question.assess({k: v * (1.1 if k == name else 1.0) for k, v in gains.items()})
+    changed = sh.evaluate_gains(
+        case, {k: v * (1.1 if k == name else 1.0) for k, v in gains.items()}
+    ).assessment
     rows.append(
         [
             name,
@@ -293,7 +312,7 @@ names = ("payload.acceleration", "payload.velocity", "payload.displacement")
 thesis_law = LinearController.static(
     [[-gains["A"] * gains[k] for k in ("a", "a1", "a2")]], names, ("drive.command",)
 )
-closed = with_feedback(question.plant, thesis_law)
+closed = with_feedback(loop.plant, thesis_law)
 fig, axes = plt.subplots(1, 3, figsize=(11, 3.2))
 for omega, colour in ((0.5, AFTER), (0.944, BEFORE), (2.0, DRUM)):
     run = time_response(closed, {"hook.heave": Sine(omega=omega)}, duration=25.0, step=0.02)
@@ -324,7 +343,7 @@ print(
 w = np.geomspace(0.01, 20, 1200)
 compliance = np.abs(loop.response("payload.displacement", "payload.force", w))
 fig, ax = plt.subplots()
-ax.loglog(w, 1e6 * np.abs(locked_response(case, w, C)) / K, color=BEFORE, label="drum held, |G|/K")
+ax.loglog(w, 1e6 * np.abs(drum_held(w)) / K, color=BEFORE, label="drum held, |G|/K")
 ax.loglog(w, 1e6 * compliance, color=AFTER, label="thesis's gains")
 ax.set(xlabel="ω [rad/s]", ylabel="|P/F| [mm/kN]", title="Compliance to a force on the payload")
 ax.legend()
@@ -333,17 +352,14 @@ plt.show()
 
 def tension_with_drum_held(of):
     """Peak rope tension in three hours with the drum held [N], by eq. 1."""
-    drag = of.drag_before
-    pole = complex(-0.5 * drag / M, math.sqrt(K / M))
-    nodes = spectral_nodes(*hook.band, splits=hook.splits, poles=[pole])
-    G = K / (K - M * nodes.omega**2 + 1j * drag * nodes.omega)
-    density = np.abs(K * (1 - G)) ** 2 * hook.density(nodes.omega)
-    m0, m2 = (float(nodes.integrate(density * nodes.omega**n)) for n in (0, 2))
+    w = np.linspace(*hook.band, 200_001)  # the rope's resonance is 0.007 rad/s wide
+    density = np.abs(K * (1 - drum_held(w, of.drag_before))) ** 2 * hook.density(w)
+    m0, m2 = (float(np.trapezoid(density * w**n, w)) for n in (0, 2))
     cycles = 3 * 3600 / (2 * math.pi * math.sqrt(m0 / m2))
     return math.sqrt(m0), math.sqrt(2 * math.log(cycles) * m0)
 
 
-(rms_thin, _), (rms_thick, peak_thick) = map(tension_with_drum_held, (question, own_drag))
+(rms_thin, _), (rms_thick, peak_thick) = map(tension_with_drum_held, (thesis, own_drag))
 after = loop.peak("rope.tension", 3 * 3600.0)
 table(
     ["", "before", "after"],
@@ -354,7 +370,7 @@ table(
             *[
                 1e6 * float(v[0])
                 for v in (
-                    np.abs(locked_response(case, np.array([0.944]), C)) / K,
+                    np.abs(drum_held(np.array([0.944]))) / K,
                     np.abs(
                         loop.response("payload.displacement", "payload.force", np.array([0.944]))
                     ),
@@ -384,12 +400,11 @@ print(
 # %% [markdown]
 # ## 7. Six cables, and the worst of them
 #
-# Lengths and payloads of Figures 6 to 11 are lost. Here: what the drum can pay out (it holds 2166
-# m) and what the motor can hold, three lengths and two payloads. $C$ follows the thesis's rule,
-# equal energy in a sine of 5.7 s; its amplitude of 0.12 m is what the identified $\zeta$ amounts
-# to. The worst cable is the one whose payload moves most in the design sea. The height of $|G|$
-# alone would point to the *shortest* rope ($|G|_{max} \approx \sqrt{KM}/C$), whose resonance no
-# wave meets.
+# Lengths and payloads of Figures 6 to 11 are lost. Here: what the drum can pay out and what the
+# motor can hold, three lengths and two payloads. $C$ follows the thesis's rule, equal energy in a
+# sine of 5.7 s; its amplitude of 0.12 m is what the identified $\zeta$ amounts to. The worst cable
+# is the one whose payload moves most in the design sea. The height of $|G|$ alone would point to
+# the *shortest* rope ($|G|_{max} \approx \sqrt{KM}/C$), whose resonance no wave meets.
 
 # %%
 rule = {"payload.drag": {"method": "energy", "amplitude": 0.12, "frequency": 1.1}}
@@ -398,7 +413,8 @@ study = cable_study(
 )
 print(study)
 worst = study.worst
-print(f"\nworst: {worst.length:.0f} m with {worst.payload_mass / 1e3:.1f} t, as identified")
+print(f"\nthe drum holds {case.winch.drum.layers[-1].rope_on_drum:.0f} m of rope")
+print(f"worst: {worst.length:.0f} m with {worst.payload_mass / 1e3:.1f} t, as identified")
 
 # %%
 lengths, payloads = np.linspace(200, 2100, 14), np.linspace(5e3, 42e3, 9)
@@ -432,14 +448,12 @@ plt.show()
 # %% [markdown]
 # ## 8. What the thesis did not look at
 #
-# **Margins.** The loop crosses over at 7.7 rad/s with a phase margin of 11.3° and survives 25.7
-# ms of delay: the signal transmission that the thesis calls the one hard part would destabilise
-# it. And it is *conditionally* stable: at 2.0 rad/s $L = -10.9$, so that a drive which saturates,
-# and thereby loses gain, can throw it into a limit cycle.
+# **Margins.**
 
 # %%
 m = loop.margins
 axis = [v for v in m.real_axis_crossings if 1.5 < v < 3]
+there = loop.loop_gain(np.array(axis))[0].real
 table(
     ["M_s", "phase margin", "delay margin", "gain may grow", "gain may fall to", "L there"],
     [
@@ -449,9 +463,18 @@ table(
             f"{1e3 * m.delay:.1f} ms",
             "without bound",
             f"{m.gain_down:.4f}",
-            f"{loop.loop_gain(np.array(axis))[0].real:.1f} at {axis[0]:.2f} rad/s",
+            f"{there:.1f} at {axis[0]:.2f} rad/s",
         ]
     ],
+)
+
+# %% tags=["hide-input"]
+say(
+    f"The loop crosses over at {m.crossovers[-1]:.1f} rad/s with a phase margin of "
+    f"{math.degrees(m.phase):.1f}° and survives {1e3 * m.delay:.1f} ms of delay: the signal "
+    "transmission that the thesis calls the one hard part would destabilise it. And it is "
+    f"*conditionally* stable: at {axis[0]:.1f} rad/s $L$ = {there:.1f}, so that a drive which "
+    "saturates, and thereby loses gain, can throw it into a limit cycle."
 )
 
 # %%
@@ -465,26 +488,22 @@ for ax, window in zip(axes, ((-14, 2, -5, 5), (-2.2, 1.2, -1.7, 1.7)), strict=Tr
     ax.plot(circle.real, circle.imag, color=HOOK, lw=0.8, ls=":", label="|L| = 1")
     ax.plot(-1, 0, "+", color=REFERENCE, ms=9)
     ax.set(xlim=window[:2], ylim=window[2:], xlabel="Re L", ylabel="Im L", aspect="equal")
-axes[0].set_title("L crosses the axis at -10.9: less gain is instability")
-axes[1].set_title("... and passes -1 at a distance of 0.19")
+axes[0].set_title(f"L crosses the axis at {there:.1f}: less gain is instability")
+axes[1].set_title(f"... and passes -1 at a distance of {1 / m.max_sensitivity:.2f}")
 axes[1].legend(loc="upper right")
 plt.show()
 
 # %% [markdown]
-# **The drive.** Over the waves, 0.2 to 3 rad/s, the motor needs 4.9 kN m rms and 409 rpm rms on
-# top of 5.05 kN m of static torque; integrated to 60 rad/s, with the heave operator's last value
-# held beyond its table, 8.98 kN m and 420 rpm, because the sea's tail meets $|X/Z| = 5.08$ at
-# 7.67 rad/s. How a RAO goes on beyond its table matters, and has to be said. The rating is 5.94
-# kN m and 1200 rpm: this winch cannot do it.
+# **The drive.** What the motor needs on top of the torque that holds the load, over the waves, and
+# with the sea's tail, where the heave operator's last value is held beyond its table. How a RAO
+# goes on beyond its table matters, and has to be said.
+
 
 # %%
-poles = [p for p in loop.poles if abs(p.real) > 1e-9]
-
-
 def over(band, output):
     """Return the standard deviation of an output from a band of frequencies [rad/s]."""
-    nodes = spectral_nodes(*band, splits=hook.splits, poles=poles)
-    return math.sqrt(nodes.integrate(loop.spectrum(output, nodes.omega)))
+    w = np.linspace(*band, 40_001)
+    return math.sqrt(np.trapezoid(loop.spectrum(output, w), w))
 
 
 table(
@@ -501,6 +520,17 @@ table(
     ],
 )
 
+# %% tags=["hide-input"]
+drive = case.winch.drive
+say(
+    f"Over the waves the motor needs {over((0.2, 3.0), 'motor.torque') / 1e3:.1f} kN m rms on top "
+    f"of {case.static_torque / 1e3:.2f} kN m of static torque, with the tail "
+    f"{over((0.2, 60.0), 'motor.torque') / 1e3:.2f} kN m, because the tail meets $|X/Z|$ = "
+    f"{peaks[1][1]:.2f} at {peaks[1][0]:.2f} rad/s. The rating is "
+    f"{drive.torque_continuous / 1e3:.2f} kN m and {drive.speed * 30 / math.pi:.0f} rpm: this "
+    "winch cannot do it."
+)
+
 # %%
 as_is = sh.evaluate_gains(case, gains)
 table(
@@ -512,10 +542,10 @@ table(
 )
 
 # %% [markdown]
-# **The rope is not one spring.** At 2000 m an axial wave takes 0.45 s from drum to payload, and
-# the second axial mode, 7.13 rad/s, lies on top of the crossover. With the rope as 2, 5, 10 or 20
-# lumped masses the thesis's closed loop is unstable; the fastest growth tends to 4.66 1/s however
-# the rope is lumped. Everything its tables promise belongs to the one-spring model.
+# **The rope is not one spring.** An axial wave takes its time from drum to payload, and the second
+# axial mode lies on top of the crossover. With the rope as 2, 5, 10 or 20 lumped masses the
+# thesis's closed loop is unstable, and the more masses, the less does the growth depend on their
+# number. Everything its tables promise belongs to the one-spring model.
 
 # %%
 rope_case = sh.load_case("thesis-1975-rope")
@@ -557,10 +587,10 @@ table(["rope masses", "growth rate [1/s]", "at [rad/s]", "unstable poles"], rows
 
 # %%
 stored = headline.load()
-Markdown(headline_page.thesis_table(stored))
+say(headline_page.thesis_table(stored))
 
 # %%
-Markdown(headline_page.redesign_table(stored))
+say(headline_page.redesign_table(stored))
 
 # %%
 fig, axes = plt.subplots(1, 3, figsize=(11.0, 3.8), sharey=True)
@@ -572,7 +602,7 @@ panels = {
 }
 for ax, (title, which) in zip(axes, panels.items(), strict=True):
     designs = headline_page.three_gains(stored, *which)
-    for delay, colour in zip(headline.DELAYS, (AFTER, DRUM, "#cc79a7"), strict=True):
+    for delay, colour in zip(headline.DELAYS, (AFTER, DRUM, OTHERS[0]), strict=True):
         of_depth = {d: designs[d, delay] for d in depths if designs[d, delay]["ok"]}
         found = [1e3 * row["payload_rms"] for row in of_depth.values()]
         ax.loglog([*of_depth], found, "o-", color=colour, ms=5, label=f"{1e3 * delay:.0f} ms")
@@ -598,7 +628,7 @@ plt.show()
 # behind the gains takes the higher modes out of the loop:
 
 # %%
-Markdown(headline_page.rolloff_table(stored))
+say(headline_page.rolloff_table(stored))
 
 # %% [markdown]
 # Two rows, computed here and now:
@@ -626,4 +656,11 @@ table(["model", "rope", "delay", "stored [mm]", "now [mm]", "status"], rows)
 
 # %% [markdown]
 # Holding a load at 2000 m needs more than these three gains: the ship's motion, measured and fed
-# forward, and a loop that knows the rope. That is where Stillhook goes next.
+# forward, and a loop that knows the rope.
+#
+# ## Where to go next
+#
+# * [When the motor saturates](02-saturation.ipynb): what the conditional stability of this loop
+#   means for a drive that has a limit.
+# * [Predictive control](03-mpc-versus-linear.ipynb): the same winch, held by what knows the limit.
+# * The page on the [thesis](../docs/thesis.md) in the documentation has the reading of its tables.

@@ -21,68 +21,38 @@
 # often it happens, and ends with what to do about it.
 #
 # Everything is on the thesis's own model, one spring, with the payload's quadratic drag and a
-# torque of at most twice the rating, 11.88 kN m, of which 5.05 kN m carry the load. All other
-# limits are off. The overspeed switch too: it would end a fall by setting the brake.
+# torque of at most twice the rating, of which nearly half carries the load. All other limits are
+# off. The overspeed switch too: it would end a fall by setting the brake.
 
 # %%
-"""Imports, a helper for tables, the case and its loop."""
+"""Imports, the case, and the fall that is to be explained."""
 
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import scipy.linalg
 from describing import bias_for, gaussian_response, sine_response
-from IPython.display import Markdown
 from limit_cycles import limit_cycles
-from torque_loop import TorqueLoop
+from looks import AFTER, BEFORE, DRUM, HOOK, REFERENCE, say, table
+from torque_loop import TorqueLoop, torque_alone
 
 import stillhook as sh
 from models import HookMotion, build_plant
-from models.basics import spectral_nodes
-from models.plant import DriveLimits
-from models.simulation import SimulationOptions, prepare, run_simulation
-from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.loop import closed_loop_poles
-from synth.question import pose
-from synth.structures import sampled_loop
+from synth import closed_loop_poles
 
 sys.path.insert(0, str(Path.cwd().parent / "docs" / "make"))
 import saturation
 from saturation import GROWING, SAMPLE_TIME, TORQUE, Sea
 
 # %matplotlib inline
-plt.rcParams.update(
-    {"figure.figsize": (8.0, 3.6), "figure.constrained_layout.use": True, "axes.grid": True}
-    | {"grid.color": "#d9d9d9", "axes.spines.top": False, "axes.spines.right": False}
-)
-
-
-def table(head, rows):
-    """Show rows of numbers or texts as a table."""
-    cells = [[v if isinstance(v, str) else f"{v:.4g}" for v in row] for row in rows]
-    lines = [" | ".join(line) for line in (head, ["---:"] * len(head), *cells)]
-    return Markdown("\n".join(f"| {line} |" for line in lines))
-
-
 gains = {"A": 200.0, "a": 50.0, "a1": 100.0, "a2": 100.0}
 case = saturation.case_for()
 controller = sh.LinearFeedback(case, gains, sample_time=SAMPLE_TIME)
 study = saturation.load()
 
-# %% [markdown]
-# ## 1. A fall
-#
-# A sea of $H_s$ = 1.25 m, half the design sea, the heave operator taken as zero beyond its table.
-# The loop holds the payload within millimetres, until one group of waves asks for more torque
-# than there is for two seconds. The payload sinks; the feedback then asks for so much more that the
-# torque stays at its limit when it should already let go, and next at the other one. From there on
-# the motor is thrown to and fro between its limits. The payload swings through ten metres and
-# never comes back.
-
-# %%
 sea = Sea(continuation="zero", height=1.25)
 fell_at = saturation.pick(study, sea.continuation, sea.height).fell_at
 seed = next(i for i, t in enumerate(fell_at) if 60.0 < t < 1000.0)
@@ -108,33 +78,51 @@ axes["phase"].set(xlabel="payload [m]", ylabel="payload [m/s]", title="Phase pla
 axes["phase"].set_ylim(-5, 6)
 axes["phase"].legend(loc="upper right", ncols=2)
 plt.show()
-held = (t > GROWING) & (t < fall - 20.0)
-at_limit = (t > fall - 20.0) & (t < fall) & (run["drive.saturated"] > 0)
-fastest = np.abs(run["motor.speed"][t > fall]).max() * 30 / math.pi
-print(f"while it holds: {1e3 * payload[held].std():.1f} mm rms")
-print(f"fallen: {payload[t > fall + 60].std():.2f} m rms, motor up to {fastest:.0f} rpm")
 
 # %% [markdown]
-# The motor is made for 1200 rpm. In earnest the overspeed switch ends the swing after some
-# seconds, and the load hangs on the brake: safe, and no longer held.
+# ## 1. A fall
 #
+# A sea of $H_s$ = 1.25 m, half the design sea, the heave operator taken as zero beyond its table.
+# The loop holds the payload within millimetres, until one group of waves asks for more torque
+# than there is for two seconds. The payload sinks; the feedback then asks for so much more that the
+# torque stays at its limit when it should already let go, and next at the other one. From there on
+# the motor is thrown to and fro between its limits. The payload swings through ten metres and
+# never comes back.
+
+# %%
+held = (t > GROWING) & (t < fall - 20.0)
+made_for = sh.load_case("thesis-1975").winch.drive.speed
+fastest = np.abs(run["motor.speed"][t > fall]).max() * 30 / math.pi
+say(
+    f"While it holds, the payload moves by {1e3 * payload[held].std():.1f} mm rms. Fallen, it "
+    f"swings by {payload[t > fall + 60].std():.2f} m rms, and the motor turns at up to "
+    f"{fastest:.0f} rpm. It is made for {made_for * 30 / math.pi:.0f} rpm, and for "
+    f"{TORQUE / 1e3:.2f} kN m at most, of which {case.static_torque / 1e3:.2f} kN m carry the "
+    "load: in earnest the overspeed switch ends the swing after some seconds, and the load hangs "
+    "on the brake, safe, and no longer held."
+)
+
+# %% [markdown]
 # ## 2. Where the margin is
 #
-# Broken at the amplifier, the loop may lose gain down to 0.092: $L = -10.9$ at 2.0 rad/s. But it
-# is the *torque* that is limited, and with the torque goes the motor's own damping, its back-EMF,
-# $K_T K_\omega / R$ = 455 N m s/rad. Broken there,
+# Broken at the amplifier, the loop may lose nine tenths of its gain. But it is the *torque* that is
+# limited, and with the torque goes the motor's own damping, its back-EMF, $K_T K_\omega / R$.
+# Broken there,
 #
 # $$ 1 + L_\tau = (1 + L_u)\, \frac{K_T / R}{P_{\tau u}}, $$
 #
-# with $P_{\tau u}$ from command to torque, the same loop has much less to lose: it is
-# unstable at 0.55 of its torque, at 5.9 rad/s. Held commands of 5 ms, as in the simulations
-# here, make it 0.58 at 6.0 rad/s.
+# with $P_{\tau u}$ from command to torque, the same loop has much less to lose, with held commands
+# of 5 ms, as in the simulations here, or without.
 
 # %%
-at_command = pose(case).assess(gains).margins
+table_end = float(case.vessel.heave_rao.omega[-1])
+at_command = sh.evaluate_gains(case, gains).margins
 loops = {T: TorqueLoop.from_case(case, controller.controller, sample_time=T) for T in (0.0, 0.005)}
 loop = loops[SAMPLE_TIME]
 DRAG = 1187.2  # that of the thesis [N s/m]; here it hardly matters
+
+
+at_torque = {T: one.margins(DRAG) for T, one in loops.items()}
 
 
 def crossing(margins):
@@ -147,18 +135,30 @@ table(
     [["the amplifier", "-", at_command.gain_down, f"{crossing(at_command):.2f} rad/s"]]
     + [
         ["the torque", f"{1e3 * T:.0f} ms", m.gain_down, f"{crossing(m):.2f} rad/s"]
-        for T, m in ((T, one.margins(DRAG)) for T, one in loops.items())
+        for T, m in at_torque.items()
     ],
+)
+
+# %% tags=["hide-input"]
+(straight, held_for) = at_torque.values()
+say(
+    f"At the amplifier the gain may fall to {at_command.gain_down:.3f}, as $L$ = "
+    f"{-1 / at_command.gain_down:.1f} at {crossing(at_command):.2f} rad/s. At the torque the loop "
+    f"is unstable with {straight.gain_down:.2f} of it, at {crossing(straight):.1f} rad/s, and with "
+    f"held commands with {held_for.gain_down:.2f}, at {crossing(held_for):.1f} rad/s. Its "
+    f"crossover is at {at_command.crossovers[-1]:.1f} rad/s with a phase margin of "
+    f"{math.degrees(at_command.phase):.0f}°, and the heave operator's table ends at "
+    f"{table_end:.2f} rad/s."
 )
 
 # %% [markdown]
 # ## 3. Where it oscillates
 #
 # What a limit leaves of an oscillation is told by its *describing function*: a demand $b + A
-# \sin\omega t$ clipped to $\pm$11.88 kN m has a mean and a first harmonic $N A$, $N < 1$. The
-# motor carries the load, so the mean has to be 5.05 kN m, which fixes the bias $b$; $1 + N(A)
-# L_\tau(i\omega) = 0$ gives the oscillations that sustain themselves. For the drag of large swings
-# $L_\tau$ takes the linear one that takes as much energy.
+# \sin\omega t$ clipped to the torque limits has a mean and a first harmonic $N A$, $N < 1$. The
+# motor carries the load, so the mean has to be the static torque, which fixes the bias $b$; $1 +
+# N(A) L_\tau(i\omega) = 0$ gives the oscillations that sustain themselves. For the drag of large
+# swings $L_\tau$ takes the linear one that takes as much energy.
 
 # %%
 first = limit_cycles(loop)
@@ -189,26 +189,21 @@ plt.show()
 #
 # Simulation finds both. In still water the hook is shaken for ten seconds at 6 rad/s, and the
 # strength is bisected between falling and recovering, until the loop stays on the edge for half a
-# minute. The describing function puts this edge at a frequency 11 % too high and an
-# amplitude 40 % too small: the load makes the clipping one-sided, and the even harmonics that
-# come of it are not filtered off. With five harmonics in the balance it is met within 1 %.
+# minute.
 
 
 # %%
 clock = np.arange(0.0, 400.0, 0.02)
 burst = np.sin(np.pi * np.clip((clock - 30.0) / 10.0, 0.0, 1.0)) ** 2 * np.sin(6.0 * clock)
-calm = prepare(
-    case,
-    controller,
-    sh.Scenario(name="calm", description="still water", duration=90.0),
-    SimulationOptions(limits=DriveLimits(torque=TORQUE), lock_limit=saturation.FALLEN, settle=0.0),
-)
+calm = sh.Scenario(name="calm", description="still water", duration=90.0)
+alone = {"limits": torque_alone(TORQUE), "lock_limit": saturation.FALLEN, "settle": 0.0}
 
 
 def shaken(strength, **options):
     """Return the run in still water after a burst of a strength [m]."""
     hook = sh.RecordMotion.from_arrays(clock, strength * burst, detrend="none", source="burst")
-    return run_simulation(replace(calm, hook=hook).with_options(**options))
+    (run,) = sh.simulate(case, controller, scenario=calm, hook=hook, **alone, **options)
+    return run
 
 
 low, high = 0.0, 0.2
@@ -266,7 +261,18 @@ for name, scale, unit, found, one, five in (
         [name, f"payload [{unit}]", *(scale * v for v in (found[1], one.payload, five.payload))],
         [name, f"its mean [{unit}]", *(scale * v for v in (found[2], one.offset, five.offset))],
     ]
-table(["", "", "simulated", "one harmonic", "five"], rows)
+table(["", "", "simulated", "one harmonic", "five"], rows, words=2)
+
+# %% tags=["hide-input"]
+(turns, swing, _), balance = measured[0], (first[0], several[0])
+too_high, too_small = 100 * (balance[0].omega / turns - 1), 100 * (1 - balance[0].payload / swing)
+off = 100 * max(abs(balance[1].omega / turns - 1), abs(balance[1].payload / swing - 1))
+say(
+    f"The describing function puts the edge at a frequency {too_high:.0f} % too high and an "
+    f"amplitude {too_small:.0f} % too small: the load makes the clipping one-sided, and the even "
+    "harmonics that come of it are not filtered off. With five harmonics in the balance frequency "
+    f"and amplitude are met within {off:.1f} %."
+)
 
 # %% [markdown]
 # The mean tells the same story: with its torque clipped on one side, the loop holds the payload
@@ -280,8 +286,8 @@ table(["", "", "simulated", "one harmonic", "five"], rows)
 # the edge. 100 seeds of 20 minutes in each sea, by `python docs/make/saturation.py`; a run has
 # fallen once the payload is half a metre off. The bars are Clopper and Pearson's 95 % intervals.
 #
-# The heave operator ends at 1.46 rad/s, the loop resonates at 7.7 rad/s, and in between lies
-# a sea's whole tail. How the operator goes on decides as much as $H_s$ does.
+# The heave operator's table ends long before the frequency at which the loop resonates, and in
+# between lies a sea's whole tail. How the operator goes on decides as much as $H_s$ does.
 
 # %%
 fig, ax = plt.subplots(figsize=(8.5, 4))
@@ -344,7 +350,7 @@ table([*head, "median [s]", "rms while held [mm]"], rows)
 # gains do not last 20 minutes in 1 m.
 #
 # The same with commands held for 1 ms in place of 5 ms, nearly the thesis's continuous loop. It
-# matters where the torque rings at 7.7 rad/s, as the phase margin there is a mere 11°:
+# matters where the torque rings at the loop's crossover, as the phase margin there is small:
 
 # %%
 rows = []
@@ -375,7 +381,7 @@ table(["beyond its table", "H_s [m]", "seeds 0 to 3"], rows)
 # $H_s$ beyond which no steady solution is left, where it would have to fall, is far off.
 #
 # It is single groups of waves that do it, and no average knows of them. With the tail of the
-# sea the torque rings at 7.7 rad/s, and is clipped a little more at every turn. Without it the
+# sea the torque rings at the crossover, and is clipped a little more at every turn. Without it the
 # slow torque of one large wave stays at its limit for two seconds, as in the fall above, and for
 # so long there is no loop at all.
 
@@ -384,10 +390,10 @@ least = loops[0.0].margins(DRAG).gain_down
 rows = []
 for name, height in (("hold", 0.75), ("hold to 3 rad/s", 1.1), ("zero", 1.25)):
     there = saturation.case_for(Sea(continuation=name, height=height))
-    view, hook = pose(there).assess(gains), HookMotion.from_case(there)
-    nodes = spectral_nodes(*hook.band, splits=hook.splits, poles=[-1 + 6j, -0.2 + 7.7j])
-    linear = np.abs(view.response("motor.torque", "hook.heave", nodes.omega)) ** 2
-    L = loops[0.0].responses(nodes.omega, DRAG)[0]
+    view, hook = sh.evaluate_gains(there, gains).assessment, HookMotion.from_case(there)
+    w = np.linspace(*hook.band, 20_001)
+    linear = np.abs(view.response("motor.torque", "hook.heave", w)) ** 2
+    L = loops[0.0].responses(w, DRAG)[0]
     heights, sigmas, gain = [], [], []
     for sigma in np.linspace(1e3, 1.5e4, 57):
         bias = bias_for(loop.static, TORQUE, sigma, gaussian_response)
@@ -395,7 +401,7 @@ for name, height in (("hold", 0.75), ("hold to 3 rad/s", 1.1), ("zero", 1.25)):
         if least > N:
             break
         closed = linear * np.abs((1 + L) / (1 + N * L)) ** 2
-        per_metre = math.sqrt(nodes.integrate(closed * hook.density(nodes.omega))) / height
+        per_metre = math.sqrt(np.trapezoid(closed * hook.density(w), w)) / height
         heights.append(sigma / per_metre)
         sigmas.append(sigma)
         gain.append(N)
@@ -425,7 +431,7 @@ on_rope = sh.LinearFeedback(rope, gains, sample_time=0.001)
     hook=sh.SineMotion(amplitude=1e-6, period=0.9),
     duration=20.0,
     masses=10,
-    limits=DriveLimits(torque=TORQUE),
+    limits=torque_alone(TORQUE),
     settle=0.0,
     store_step=0.001,
 )
@@ -435,8 +441,14 @@ x, lag = swing[begin:end], 20  # a growing oscillation obeys x[k+2] = p x[k+1] +
 (p, q), *_ = np.linalg.lstsq(np.stack([x[lag:-lag], x[: -2 * lag]], 1), x[2 * lag :], rcond=None)
 simulated = np.log(np.roots([1, -p, -q]).astype(complex)[0]) / (lag * 0.001)
 plant = build_plant(rope, 10)
-poles = closed_loop_poles(plant.linearise(drag=0.0), on_rope.controller)
-turns = sampled_loop(rope, plant, on_rope.recursion, 0.001).poles()
+linear, law = plant.linearise(drag=0.0), on_rope.controller
+poles = closed_loop_poles(linear, law)
+# Sampled: the plant's exact step with the command held, and u = K y closed around it.
+n, heard = len(linear.A), [linear.measurements.index(name) for name in law.measurements]
+step = np.zeros((n + 1, n + 1))
+step[:n, :n], step[:n, n:] = linear.A, linear.B
+step = scipy.linalg.expm(0.001 * step)
+turns = np.linalg.eigvals(step[:n, :n] + step[:n, n:] @ law.D @ linear.C[heard])
 fastest = [poles[np.argmax(poles.real)], np.log(turns[np.argmax(np.abs(turns))]) / 0.001]
 fig, ax = plt.subplots(figsize=(8, 3.2))
 ax.semilogy(t, np.abs(swing) / 1e3, color=DRUM, lw=1.0, label="torque, off its static value")
@@ -483,16 +495,14 @@ for name, (a, a1, a2) in designs.items():
     own = {"A": 200.0, "a": a, "a1": a1, "a2": a2}
     sea = Sea(continuation="zero", height=1.9)
     there = saturation.case_for(sea)
-    view = pose(there.replace({"payload.drag": {"method": "stochastic"}})).assess(own)
+    view = sh.evaluate_gains(there.replace({"payload.drag": {"method": "stochastic"}}), own)
     law = sh.LinearFeedback(there, own).controller
-    margins = TorqueLoop.from_case(there, law, sample_time=SAMPLE_TIME).margins(
-        view.coefficients[0]
-    )
+    margins = TorqueLoop.from_case(there, law, sample_time=SAMPLE_TIME).margins(view.drag)
     runs = saturation.runs_in(sea, 5, gains=own)
     found = [view.margins.max_sensitivity, view.margins.gain_down, margins.gain_down]
-    rms = [1e3 * view.sigma("payload.displacement"), 1e3 * runs.summary["payload rms"].mean]
+    rms = [1e3 * view.payload_rms, 1e3 * runs.summary["payload rms"].mean]
     rows.append([name, *found, *rms, runs.summary["saturated share"].mean])
-before = 1e3 * pose(there.replace({"payload.drag": {"method": "stochastic"}})).payload_rms_before
+before = 1e3 * view.payload_rms_before
 rows.append(["drum held", *["-"] * 3, before, "-", "-"])
 head = ["gains", "M_s", "gain may fall to", "torque may fall to", "linear rms [mm]"]
 table([*head, "simulated rms, H_s 1.9 m [mm]", "time at the limit [%]"], rows)
@@ -507,4 +517,10 @@ table([*head, "simulated rms, H_s 1.9 m [mm]", "time at the limit [%]"], rows)
 #
 # *A controller that knows the limit.* What to do at the limit is a question of what comes next,
 # and no gain can answer it: with a second's foresight the motor would haul before the wave. That
-# is what model predictive control is for, and where Stillhook goes next.
+# is what model predictive control is for.
+#
+# ## Where to go next
+#
+# * [Predictive control against linear feedback](03-mpc-versus-linear.ipynb): the same winch in the
+#   same seas.
+# * `docs/make/saturation.py` repeats the study with seeds and seas of your own.

@@ -28,27 +28,18 @@
 # `docs/compare.md`.
 
 # %%
-"""Imports, the case, and a helper for tables."""
+"""Imports, the case, and the picture to be explained: one sea, one motor, two controllers."""
 
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
-from IPython.display import Markdown
+from foretelling import least_error
+from looks import AFTER, BEFORE, DRUM, HOOK, OTHERS, REFERENCE, say, table
 
 import stillhook as sh
-from models.operation import SpectrumMotion
-from models.simulation import EASE
-from mpc.forecast import AdaptiveAR, PerfectPreview
-from mpc.linear import path_of_sea
-from stillhook.text import AFTER, BEFORE, DRUM, HOOK, REFERENCE
-from synth.question import pose
 
 # %matplotlib inline
-plt.rcParams.update(
-    {"figure.figsize": (8.5, 3.8), "figure.constrained_layout.use": True, "axes.grid": True}
-    | {"grid.color": "#d9d9d9", "axes.spines.top": False, "axes.spines.right": False}
-)
 HEIGHTS = (1.25, 1.9, 2.43, 3.75)  # significant wave heights [m]; 2.43 m is the thesis's sea
 RUNS = {"seeds": 2, "duration": "3 min"}
 SETTLE = 24.0  # when statistics of such a run begin [s]
@@ -58,89 +49,68 @@ case = sh.load_case("thesis-1975").replace({"sensors.mru": unit})
 seas = {h: case.replace({"sea.significant_height": h}) for h in HEIGHTS}
 
 
-def table(head, rows):
-    """Show rows of numbers or texts as a table."""
-    cells = [[v if isinstance(v, str) else f"{v:.3g}" for v in row] for row in rows]
-    lines = [" | ".join(line) for line in (head, ["---", *["---:"] * (len(head) - 1)], *cells)]
-    return Markdown("\n".join(f"| {line} |" for line in lines))
-
-
 def gains(a, a1, a2):
     """Return gains with the thesis's A."""
     return {"A": 200.0, "a": a, "a1": a1, "a2": a2}
 
 
-# %% [markdown]
-# ## 1. What saturation does to a linear loop
-#
-# The thesis's gains in a sea of $H_s$ = 1.25 m, half its design sea. The payload is held within
-# millimetres, until one group of waves asks for more torque than there is. The loop needs its gain
-# to be stable; with the torque at its limit it has less, and the payload is lost for good.
-
-# %%
 thesis = gains(50.0, 100.0, 100.0)
 held = {"seeds": [1], "duration": "3 min"}
 (fallen,) = sh.simulate(seas[1.25], sh.LinearFeedback(seas[1.25], thesis), **held)
+weights = sh.tune_weights(seas[2.43])
+(stilled,) = sh.simulate(seas[1.25], sh.LinearMPC(seas[1.25], weights=weights), **held)
 t, payload = fallen.time, fallen["payload.displacement"]
 fall = float(t[np.argmax(np.abs(payload) > 0.5)])
 peak = case.winch.drive.torque_peak
 
-
-def traces(axes, run, colour, label):
-    """Draw payload and torque around the fall, side by side."""
+fig, axes = plt.subplots(1, 2, figsize=(10, 3.6))
+for run, colour, label in ((fallen, BEFORE, "the thesis's gains"), (stilled, AFTER, "MPC")):
     near = (run.time > fall - 25.0) & (run.time < fall + 12.0)
     at = run.time[near] - fall
     axes[0].plot(at, 1e3 * run["payload.displacement"][near], color=colour, lw=1.2, label=label)
     axes[1].plot(at, run["motor.torque"][near] / 1e3, color=colour, lw=1.2, label=label)
-    for limit in (-peak, peak):
-        axes[1].axhline(limit / 1e3, color=REFERENCE, lw=0.8, ls="--")
-    axes[0].set(xlabel="time from the fall [s]", ylabel="payload [mm]")
-    axes[1].set(xlabel="time from the fall [s]", ylabel="motor torque [kN m]")
-
-
-fig, axes = plt.subplots(1, 2, figsize=(10, 3.6))
-traces(axes, fallen, BEFORE, "the thesis's gains")
-axes[0].set(ylim=(-150, 150), title=f"Seed 1, $H_s$ = 1.25 m: lost at {fall:.0f} s")
-axes[1].set_title("The torque goes from limit to limit")
+for limit in (-peak, peak):
+    axes[1].axhline(limit / 1e3, color=REFERENCE, lw=0.8, ls="--")
+axes[0].set(xlabel="time from the fall [s]", ylabel="payload [mm]", ylim=(-150, 150))
+axes[0].set_title(f"Seed 1, $H_s$ = 1.25 m: lost at {fall:.0f} s")
+axes[0].legend(loc="upper left")
+axes[1].set(xlabel="time from the fall [s]", ylabel="motor torque [kN m]")
+axes[1].set_title("The same motor, the same limits")
 plt.show()
-calm = (t > SETTLE) & (t < fall - 10.0)
-print(
-    f"before: {1e3 * payload[calm].std():.1f} mm rms; after: {payload[t > fall + 30].std():.2f} m"
-)
 
 # %% [markdown]
-# ## 2. The same record, with the limit known
+# ## 1. What saturation does to a linear loop, and to one that knows the limit
 #
-# `LinearMPC` estimates winch, payload and sea from all sensors, predicts the hook for the next
-# eight seconds, and finds the torques that keep the payload stillest *within the limit*, anew every
-# 50 ms. What it trusts how much (`Weights`) is tuned for the case on paper: no simulation is used.
-# Its plans are made on a rope 1.4 times as stiff as it is, so that a drive at its limit can still
-# hold a load or a rope that is off; who is told the future plans on the rope that is there.
+# Orange: the thesis's gains in a sea of half its design height. The payload is held within
+# millimetres, until one group of waves asks for more torque than there is. The loop needs its gain
+# to be stable; with the torque at its limit it has less, and the payload is lost for good.
+#
+# Blue: `LinearMPC` estimates winch, payload and sea from all sensors, predicts the hook for the
+# next eight seconds, and finds the torques that keep the payload stillest *within the limit*, anew
+# every 50 ms. What it trusts how much (`Weights`) is tuned for the case on paper: no simulation is
+# used. Its plans are made on a rope that is stiffer than it is, so that a drive at its limit can
+# still hold a load or a rope that is off; who is told the future plans on the rope that is there.
 
 # %%
-weights = sh.tune_weights(seas[2.43])
 exact = replace(weights, stiffness=1.0)
-mpc = sh.LinearMPC(seas[1.25], weights=weights)
-(stilled,) = sh.simulate(seas[1.25], mpc, **held)
-fig, axes = plt.subplots(1, 2, figsize=(10, 3.6))
-traces(axes, fallen, BEFORE, "the thesis's gains")
-traces(axes, stilled, AFTER, "MPC")
-axes[0].set(ylim=(-30, 30), title="The same sea")
-axes[1].set_title("The same motor")
-axes[0].legend(loc="upper left")
-plt.show()
+calm = (t > SETTLE) & (t < fall - 10.0)
 after = stilled.time > SETTLE
-torque = np.abs(stilled["motor.torque"][after])
-print(f"MPC: {1e3 * stilled['payload.displacement'][after].std():.1f} mm rms")
-print(f"at the limit {100 * stilled['drive.saturated'][after].mean():.0f} % of the time")
-print(f"M_s of its unsaturated loop: {weights.max_sensitivity:.2f}")
+limited = 100 * stilled["drive.saturated"][after].mean()
+say(
+    f"* The thesis's gains: {1e3 * payload[calm].std():.1f} mm rms before the fall, "
+    f"{payload[t > fall + 30].std():.2f} m after it.\n"
+    f"* MPC: {1e3 * stilled['payload.displacement'][after].std():.1f} mm rms in the same three "
+    f"minutes, at the limit {limited:.0f} % of the time.\n"
+    f"* $M_s$ of its unsaturated loop is {weights.max_sensitivity:.2f}, and it plans on a rope "
+    f"{weights.stiffness:.2g} times as stiff as the rope is."
+)
 
 # %% [markdown]
 # The motor is at its limit before the fall with both. The difference is what follows: MPC reckons
 # with the torque that it will not have, gives way by some millimetres in time, and takes the
 # payload back. A saturated step is a plan like any other.
 #
-# ## 3. What foresight buys
+# ## 2. What foresight buys
 #
 # Left: $H_s$ = 2.43 m, where the motor is often at its limit. The controller is told the hook's
 # motion as it will be (no sensor can do that), for as many seconds as its horizon has; and, as it
@@ -157,43 +127,47 @@ print(f"M_s of its unsaturated loop: {weights.max_sensitivity:.2f}")
 # allows for a slow error that this unit does not have.
 
 # %%
-ahead, horizons = {}, (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 14.0)
+ahead, horizons = {}, (1.0, 2.0, 3.0, 4.0, 8.0, 14.0)
 for horizon in horizons:
-    seen = PerfectPreview(sample_time=0.05, horizon=horizon)
-    for kind in ("kalman", seen):
+    for kind in ("kalman", "preview"):
         name, own = ("predicted", weights) if kind == "kalman" else ("told", exact)
         control = sh.LinearMPC(seas[2.43], weights=own, horizon=horizon, predictor=kind)
         runs = sh.simulate(seas[2.43], control, **RUNS)
         ahead[name, horizon] = [1e3 * run["payload.displacement"][480:].std() for run in runs]
 
 
+last = 160  # samples ahead
+
+
 class Listening(sh.LinearMPC):
-    """Keeps what the unit shows and what the controller thinks of the sea."""
+    """Keeps at every step what the controller foretells of the hook, for eight seconds."""
 
     def reset(self):
         """Forget."""
         super().reset()
-        self.shown, self.sea = [], []
+        self.foretold = []
 
     def step(self, measurement, time):
         """Do as always, and take notes."""
         command = super().step(measurement, time)
-        self.shown.append((measurement["mru.heave"], measurement["mru.heave_rate"]))
-        self.sea.append(self.estimator.state[self.model.sea_at].copy())
+        if self.predictor is None:  # the filter's own sea, left to itself
+            self.foretold.append(ahead_of_sea @ self.estimator.state[self.model.sea_at])
+        else:
+            self.foretold.append(self.predictor.forecast().displacement.copy())
         return command
 
 
-listening = Listening(seas[1.25], weights=weights)
-(run,) = sh.simulate(seas[1.25], listening, seeds=1, duration="10 min")
-hook, last = run["hook.heave"], 160  # samples ahead
-learning, rows = AdaptiveAR(sample_time=0.05, horizon=8.0), []
-for heave, rate in listening.shown:
-    learning.update(heave, rate, True, 0.0)
-    rows.append(learning.forecast().displacement.copy())
-forecasts = {
-    "MPC's own, all sensors": listening.sea @ path_of_sea(listening.model, last)[::2].T,
-    "AR model, learns on line": np.array(rows),
-}
+own, learning = (
+    Listening(seas[1.25], weights=weights, predictor=kind, horizon=8.0) for kind in ("kalman", "ar")
+)
+at = own.model.sea_at  # the states of a sea, and how it goes on over a sample
+one, shown = own.model.A[at, at], own.model.hook[0, at]
+ahead_of_sea = np.array([shown @ np.linalg.matrix_power(one, k) for k in range(last + 1)])
+forecasts = {}
+for name, control in (("MPC's own, all sensors", own), ("AR model, learns on line", learning)):
+    (run,) = sh.simulate(seas[1.25], control, seeds=1, duration="10 min", compiled=False)
+    forecasts[name] = np.array(control.foretold)
+hook = run["hook.heave"]  # the same in both
 now = np.arange(2400, hook.size - last)  # from two minutes on: the AR model has learnt by then
 leads = np.arange(0, last + 1, 10)
 share = {
@@ -210,9 +184,8 @@ axes[0].text(9.5, 135, "predicted", color=AFTER)
 axes[0].text(10.5, 15, "told", color=DRUM)
 axes[0].set(yscale="log", ylim=(6, 5e3), xlabel="horizon [s]", ylabel="payload [mm rms]")
 axes[0].set_title("Seconds of foresight, $H_s$ = 2.43 m")
-best = [0.9, 6.1, 12.3, 15.4, 15.8, 17.1, 22.2, 29.1, 35.0]  # [%], every half second
-best += [38.4, 39.4, 39.5, 41.3, 45.9, 52.4, 58.6, 62.7]
-axes[1].plot(0.05 * leads, np.divide(best, 100.0), color=AFTER, lw=1.2, label="best from the unit")
+best = least_error(seas[1.25], 0.05 * leads)
+axes[1].plot(0.05 * leads, best, color=AFTER, lw=1.2, label="best from the unit")
 for (name, found), colour, mark in zip(share.items(), (DRUM, BEFORE), "s^", strict=True):
     axes[1].plot(0.05 * leads, found, mark, color=colour, ms=4, label=name)
 axes[1].set(xlabel="lead [s]", ylabel="error over the hook's rms", ylim=(0, 0.9))
@@ -225,7 +198,7 @@ table(
 )
 
 # %% [markdown]
-# ## 4. Over the seas
+# ## 3. Over the seas
 #
 # All contenders meet the same seas on the same nonlinear plant (`sh.compare`). The linear laws
 # have to be chosen with care, or the comparison is rigged: a law that is designed for a motor
@@ -264,8 +237,7 @@ COMBINED = {  # `sh.optimise_gains(..., "combined")`, the same, for 1.0 m
     "heave.lead": 7.0114e-07,
     "heave.bandwidth": 1.590743,
 }
-law = pose(case, "combined").law
-combined = law.controller([COMBINED[p.name] for p in law.parameters])
+combined = sh.evaluate_gains(case, COMBINED, "combined").controller
 
 
 def feedback(fixed=None):
@@ -299,8 +271,12 @@ found = sh.compare(
 )
 floors = {}
 for h in HEIGHTS:
-    source = SpectrumMotion.from_case(seas[h])
-    records = [source.motion(180.0, 0.05, seed).eased(EASE) for seed in found.seeds]
+    moved = sh.simulate(seas[h], "none", seeds=found.seeds, duration="3 min", store_step=0.05)
+    series = [[run[f"hook.{n}"] for n in ("heave", "heave_rate")] for run in moved]
+    records = [
+        sh.RecordMotion.from_arrays(moved[0].time, *one, detrend="none").motion(180.0, 0.05, 0)
+        for one in series
+    ]
     floors[h] = [sh.clairvoyant(seas[h], r, sample_time=0.1, settle=SETTLE) for r in records]
 
 pooled = {(c.name, h): 1e3 * found.pooled(c.name, h) for c in found.contenders for h in HEIGHTS}
@@ -323,9 +299,9 @@ fig, ax = plt.subplots(figsize=(8.5, 4.6))
 SHOWN = {
     "none": ("drum held", HOOK, "o-"),
     "thesis's gains": ("the thesis's gains", BEFORE, "v-"),
-    "feed-forward 0.9": ("feed-forward 0.9", "#e69f00", "P-"),
-    "feedback within the limits": ("feedback within the limits", "#cc79a7", "x-"),
-    "combined for 1.0 m": ("combined for 1.0 m", "#56b4e9", "D-"),
+    "feed-forward 0.9": ("feed-forward 0.9", OTHERS[1], "P-"),
+    "feedback within the limits": ("feedback within the limits", OTHERS[0], "x-"),
+    "combined for 1.0 m": ("combined for 1.0 m", OTHERS[2], "D-"),
     "best linear": ("best linear, in hindsight", REFERENCE, "o--"),
     "MPC": ("MPC", AFTER, "s-"),
     "MPC, told the future": ("MPC, told the future", DRUM, "^-"),
@@ -340,15 +316,15 @@ ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
 
 # %% [markdown]
-# ## 5. What it costs
+# ## 4. What it costs
 #
-# *Computing.* A step takes some tens of microseconds in Python, of the 50 ms there are (here on
-# whatever machine this is; `benchmarks/mpc_solvers.py` measures it with care). Compiled linear laws
-# take none to speak of.
+# *Computing.* A step in Python takes a small part of the 50 ms there are (here on whatever machine
+# this is; `benchmarks/mpc_solvers.py` measures it with care). Compiled linear laws take none to
+# speak of.
 #
 # *Torque and heat.* A still payload has its price whoever holds it: the drum has to undo the
-# hook's whole motion. Where the torque's rms is above the rating of 5.94 kN m, the windings (time
-# constant 30 min) reach their rated rise after the time in the last column, and the work has to
+# hook's whole motion. Where the torque's rms is above the motor's rating, its windings reach their
+# rated rise after the time in the last column, and the work has to
 # end. MPC does not spare the motor: it works it harder than feed-forward in high seas.
 # `LinearMPC(..., thermal=True)` cuts the torque back in time, for a load that moves more. Told the
 # future it needs less torque: some of it goes into correcting forecasts.
@@ -366,6 +342,7 @@ for h in HEIGHTS:
             [f"{h:.4g} m: {name}", step, line["torque rms"] / 1e3, line["saturated"], lasts]
         )
 head = ["", "step, median [us]", "torque [kN m rms]", "at the limit [%]"]
+print(f"rating {rating / 1e3:.2f} kN m, time constant of the windings {warming / 60:.0f} min")
 table([*head, "can go on for [min]"], rows)
 
 # %% [markdown]
@@ -434,7 +411,7 @@ plt.show()
 print("H_s = 0.6 m:", ", ".join(f"{name} {v:.2g} mm" for name, v in in_small.items()))
 
 # %% [markdown]
-# ## 6. In short
+# ## 5. In short
 #
 # Said by the numbers above.
 
@@ -464,4 +441,13 @@ lines += [
     f"* What had better be right: '{worst[1]}' costs {worst[0] / off['as believed', 'kalman']:.0f} "
     "times the rms.",
 ]
-Markdown("\n".join(lines))
+say("\n".join(lines))
+
+# %% [markdown]
+# ## Where to go next
+#
+# * [Robustness and operability](04-robustness-and-operability.ipynb): what may be off, and which
+#   seas.
+# * [A plant of your own](06-plant-of-your-own.ipynb): the programme behind `LinearMPC`, for
+#   anything.
+# * [Export](07-export.ipynb): predictive control as C for a drive.

@@ -20,16 +20,13 @@
 # the stillest ones whose sensitivity stays below 2.
 
 # %%
-"""Imports and the two designs."""
+"""Imports, and the two designs."""
 
 import matplotlib.pyplot as plt
 import numpy as np
-from IPython.display import Markdown
+from looks import AFTER, BEFORE, HOOK, OTHERS, REFERENCE, say, table
 
 import stillhook as sh
-from models.spread import Normal, Spread, Uniform
-from stillhook.seas import contour_figure
-from stillhook.text import AFTER, BEFORE
 
 # %matplotlib inline
 case = sh.load_case("thesis-1975")
@@ -39,20 +36,27 @@ designs = {
 }
 COLOURS = dict(zip(designs, (BEFORE, AFTER), strict=True))
 
+circle = np.exp(1j * np.linspace(0, 2 * np.pi, 300))
+w = np.geomspace(0.3, 400.0, 6000)
+fig, ax = plt.subplots(figsize=(8.0, 4.0))
+for name, design in designs.items():
+    L = design.assessment.loop_gain(w)
+    ax.plot(L.real, L.imag, color=COLOURS[name], label=name)
+ax.plot(*(circle.real / 2 - 1, circle.imag / 2), color=HOOK, lw=1.0, label="$M_s$ = 2")
+ax.plot(-1, 0, "+", color=REFERENCE, ms=9)
+ax.set(xlim=(-3, 1.5), ylim=(-1.5, 1.0), xlabel="Re L", ylabel="Im L", aspect="equal")
+ax.set_title("How near the two loops come to -1")
+ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+plt.show()
 
-def table(head, rows):
-    """Show rows of numbers or texts as a table."""
-    cells = [[v if isinstance(v, str) else f"{v:.3g}" for v in row] for row in rows]
-    lines = [" | ".join(line) for line in (head, ["---", *["---:"] * (len(head) - 1)], *cells)]
-    return Markdown("\n".join(f"| {line} |" for line in lines))
-
-
+# %%
 table(
     ["design", "payload rms [mm]", "M_s", "delay margin [ms]"],
     [
         (name, 1e3 * d.payload_rms, d.margins.max_sensitivity, 1e3 * d.margins.delay)
         for name, d in designs.items()
     ],
+    digits=3,
 )
 
 # %% [markdown]
@@ -92,6 +96,7 @@ moved = studies["the thesis's gains"].moved(0.10)
 table(
     ["10 % more", "payload rms [mm]", "M_s"],
     [(m.path, 1e3 * m.payload_rms, m.max_sensitivity) for m in moved],
+    digits=3,
 )
 
 # %% [markdown]
@@ -102,12 +107,12 @@ table(
 # rms by the same quadrature as the design.
 
 # %%
-spread = Spread(
+spread = sh.Spread(
     {
-        "payload.mass": Uniform("30 %"),
-        "rope.axial_stiffness": Uniform("20 %"),
-        "winch.motor.resistance": Normal(sd="10 %"),
-        "sensors.telemetry.delay": Uniform("0 ms", "40 ms"),
+        "payload.mass": sh.Uniform("30 %"),
+        "rope.axial_stiffness": sh.Uniform("20 %"),
+        "winch.motor.resistance": sh.Normal(sd="10 %"),
+        "sensors.telemetry.delay": sh.Uniform("0 ms", "40 ms"),
     }
 )
 worlds = {name: sh.sweep(d, spread, samples=4096) for name, d in designs.items()}
@@ -116,7 +121,7 @@ for name, found in worlds.items():
     stable = found.stable.values
     rms = 1e3 * found.payload_rms.values[stable]
     rows.append((name, f"{100 * stable.mean():.1f} %", *np.quantile(rms, [0.05, 0.5, 0.95])))
-table(["design", "stable", "5 % [mm]", "median [mm]", "95 % [mm]"], rows)
+table(["design", "stable", "5 % [mm]", "median [mm]", "95 % [mm]"], rows, digits=3)
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(10, 3.6))
@@ -136,12 +141,20 @@ axes[1].set_title("The delay breaks one of them")
 axes[1].legend(fontsize=8)
 plt.show()
 
+# %% tags=["hide-input"]
+unstable = [100 - 100 * found.stable.values.mean() for found in worlds.values()]
+soft = studies["optimised, $M_s$ at most 2"]["rope.axial_stiffness"].max_sensitivity
+say(
+    "The thesis's gains are very still where they are stable, and that is a matter of the "
+    f"telemetry: {unstable[0]:.0f} % of these worlds are lost to its delay. The gains with $M_s$ "
+    f"at most 2 do not mind the delay and lose {unstable[1]:.0f} % to something else: their $M_s$ "
+    f"moves by {abs(soft):.0f} % for a per cent of the rope's stiffness."
+)
+
 # %% [markdown]
-# The thesis's gains are very still where they are stable, and that is a matter of the telemetry: a
-# third of these worlds is lost to its delay. The gains with $M_s$ at most 2 do not mind the delay
-# and lose one world in twenty-five to something else. The tornado above says to what: their $M_s$
-# moves by 4 % for a per cent of the rope's stiffness. A bound on $M_s$ is a bound where one stands,
-# not thirty per cent away; gains for a whole range are what `stillhook robust` finds.
+# What breaks the second design in some of these worlds? The tornado above says what its $M_s$ moves
+# with. A bound on $M_s$ is a bound where one stands, not thirty per cent away; gains for a whole
+# range are what `stillhook robust` finds.
 #
 # Sobol's indices share out the variance of the loop's distance to instability, $1/M_s$, among the
 # four. What is unstable has none: it is left out, counted.
@@ -167,16 +180,43 @@ for name, found in limits.items():
     print(f"{name}\n{found}\n")
 
 # %%
-contour_figure(limits["optimised, $M_s$ at most 2"])
+best = limits["optimised, $M_s$ at most 2"].dataset
+fig, ax = plt.subplots(figsize=(8.0, 4.0))
+for name, found in limits.items():
+    height = np.ravel(found.dataset.height.values)
+    ax.plot(periods, height, "o-", color=COLOURS[name], ms=4, label=name)
+perfect = np.ravel(best.height_perfect.values)
+ax.plot(periods, perfect, color=OTHERS[2], label="any winch of this size that follows the hook")
+ax.plot(periods, np.ravel(best.height_held.values), "--", color=HOOK, label="drum held")
+ax.axhline(case.sea.significant_height, color=REFERENCE, lw=0.8, ls=":")
+ax.text(5.1, case.sea.significant_height - 0.12, "the thesis's design sea", fontsize=8)
+ax.set(xlabel="peak period [s]", ylabel="limiting $H_s$ [m]", ylim=(0, 2.6))
+ax.set_title("The highest sea in which everything holds")
+ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+plt.show()
+
+# %% tags=["hide-input"]
+shares = {name: 100 * float(found.dataset.workable) for name, found in limits.items()}
+named = dict(zip(("thesis", "own"), shares.values(), strict=True))
+binds = sorted({str(name) for name in np.ravel(best.binding.values)})
+say(
+    f"The optimised gains ask less of the motor, and can work in {named['own']:.0f} % of this "
+    f"made-up year against the thesis's {named['thesis']:.0f} %. Neither comes near the sea that "
+    f"the thesis designed for, $H_s$ = {case.sea.significant_height:.1f} m. What binds is "
+    f"{' or '.join(f'`{n}`' for n in binds)}, and so it would for a winch that follows the hook "
+    "perfectly: the drive limits this winch, not its gains. With the drum held, a tenth of a "
+    "metre of payload motion is too much in nearly every sea: that is the resonance of the rope."
+)
 
 # %% [markdown]
-# The optimised gains ask less of the motor, and can work in a tenth of this made-up year against
-# the thesis's 7 %. Neither comes near the sea that the thesis designed for, $H_s$ = 2.4 m: the
-# motor's current is at its peak long before, and so it would be for a winch that follows the hook
-# perfectly. The drive limits this winch, not its gains. With the drum held, a tenth of a metre of
-# payload motion is too much in nearly every sea: that is the resonance of the rope. The same for a
-# vessel with six RAOs, over headings, with the scatter diagram of a real site:
+# The same for a vessel with six RAOs, over headings, with the scatter diagram of a real site:
 #
 # ```
 # stillhook operability subsea-crane --payload-rms "50 mm" --scatter site.csv
 # ```
+#
+# ## Where to go next
+#
+# * [A vessel of your own](05-vessel-of-your-own.ipynb): from a file of RAOs to a report.
+# * `sh.optimise_robust` finds one set of gains for a family of plants and seas, and `sh.robustness`
+#   says how far the numbers may be off together.

@@ -26,10 +26,15 @@ import numpy.typing as npt
 
 from models.basics import ComplexArray, FloatArray, InputError, check_range
 from models.case import Case
-from models.plant import LinearPlant, build_plant
+from models.plant import DriveLimits, LinearPlant, build_plant
 from synth.loop import LinearController, Margins, closed_loop_poles, frequency_grid, loop_margins
 
 _OWNER = "torque loop"
+
+
+def torque_alone(limit: float) -> DriveLimits:
+    """Return a drive that is limited by its torque [N m] and by nothing else."""
+    return DriveLimits(torque=limit)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
