@@ -47,6 +47,7 @@ SCRIPTS: Mapping[str, str] = {
     "sweep.csv": "benchmarks/sweep.py",
     "sweep_workers.csv": "benchmarks/sweep_workers.py",
     "synthesis.csv": "benchmarks/synthesis.py",
+    "validation.csv": "docs/make/validation.py",
 }
 _MADE = re.compile(r"^# Written by (?P<script>\S+) with code (?P<code>[0-9a-f]+)\.")
 

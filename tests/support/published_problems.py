@@ -218,3 +218,134 @@ def acados_answer(p: Published, x0: np.ndarray) -> np.ndarray:
     if solver.solve() != 0:
         raise ValueError("acados found no optimum")
     return np.asarray(solver.get(0, "u"))
+
+
+# Synthesis: plants whose best controllers are printed --------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class PublishedPI:
+    """K (1 + 1/(T_i s)) of the largest K/T_i with a sensitivity of at most `max_sensitivity`."""
+
+    poles: tuple[float, ...]  # of G, with G(0) = 1
+    max_sensitivity: float
+    gain: float
+    integral_time: float
+
+    @property
+    def plant(self) -> LinearPlant:
+        """G, its output and the integral of it measured, with a load disturbance at its input."""
+        n = len(self.poles)
+        A, B = np.diag(self.poles, 0) + np.eye(n, k=-1), np.eye(n, 1) * abs(np.prod(self.poles))
+        C = np.eye(1, n, k=n - 1)
+        A = np.block([[A, np.zeros((n, 1))], [C, np.zeros((1, 1))]])
+        B, C = np.vstack([B, [[0.0]]]), np.eye(2, n + 1, k=n - 1)
+        return LinearPlant(
+            A=A, B=B, E=B, C=C, Cz=C[:1], inputs=("u",), disturbances=("load",),
+            measurements=("y", "integral"), outputs=("y",),
+        )  # fmt: skip
+
+    @property
+    def slow(self) -> tuple[np.ndarray, np.ndarray]:
+        """A load so slow that it is answered by s/k_i alone: its least variance has most k_i."""
+        return np.array([1e-4, 3e-4, 1e-3]), np.ones(3)
+
+
+#: K. J. Astrom, H. Panagopoulos and T. Hagglund, "Design of PI controllers based on non-convex
+#: optimization", Automatica 34, 1998: the first two processes of its table, 1/(s + 1)^3 and
+#: 1/((s + 1) (1 + 0.2 s) (1 + 0.04 s) (1 + 0.008 s)).
+PI_DESIGNS = {
+    f"{name}, M_s {bound}": PublishedPI(
+        poles=poles, max_sensitivity=bound, gain=gain, integral_time=time
+    )
+    for name, poles, rows in (
+        ("three equal lags", (-1.0, -1.0, -1.0), ((1.4, 0.633, 1.95), (2.0, 1.22, 1.78))),
+        ("four lags", (-1.0, -5.0, -25.0, -125.0), ((1.4, 1.93, 0.74), (2.0, 4.13, 0.59))),
+    )
+    for bound, gain, time in rows
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PublishedLQG:
+    """u = -F x^, x^' = A x^ + B u + K (y - C x^), of the least weighted variance."""
+
+    plant: LinearPlant
+    minimise: dict[str, float]
+    noise: dict[str, float]  # intensities of white noise
+    F: np.ndarray
+    K: np.ndarray
+
+    @property
+    def controller(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """A, B, C, D of u = +C(s) y."""
+        p, F, K = self.plant, np.atleast_2d(self.F), np.reshape(self.K, (-1, 1))
+        return p.A - p.B @ F - K @ p.C, K, -F, np.zeros((1, 1))
+
+
+def position_servo() -> PublishedLQG:
+    """H. Kwakernaak and R. Sivan, Linear Optimal Control Systems, 1972, examples 3.8 and 4.4.
+
+    Position control by a DC motor: 0.787 rad/(V s2), 4.6 1/s, weight 0.00002 rad2/V2; a torque
+    disturbance of 10 N2 m2 s on 0.1 1/(kg m2), an error of 1e-7 rad2 s of the angle.
+    """
+    plant = LinearPlant(
+        A=[[0.0, 1.0], [0.0, -4.6]], B=[[0.0], [0.787]], E=[[0.0, 0.0], [0.1, 0.0]],
+        C=[[1.0, 0.0]], F=[[0.0, 1.0]], Cz=[[1.0, 0.0], [0.0, 0.0]], Dz=[[0.0], [1.0]],
+        inputs=("voltage",), disturbances=("torque", "error"), measurements=("angle",),
+        outputs=("position", "effort"),
+    )  # fmt: skip
+    return PublishedLQG(
+        plant=plant, minimise={"position": 1.0, "effort": 0.00002},
+        noise={"torque": 10.0, "error": 1e-7},
+        F=np.array([223.6, 18.69]), K=np.array([40.36, 814.3]),
+    )  # fmt: skip
+
+
+def no_margins(weight: float = 12.0) -> PublishedLQG:
+    """J. C. Doyle, "Guaranteed margins for LQG regulators", IEEE TAC 23, 1978.
+
+    x' = [1 1; 0 1] x + [0; 1] u + [1; 1] w, y = [1 0] x + v, cost weight (x1 + x2)^2 + u^2, w as
+    strong as that weight: F = f [1 1] and K = f [1; 1] with f = 2 + sqrt(4 + weight).
+    """
+    f = 2.0 + np.sqrt(4.0 + weight)
+    plant = LinearPlant(
+        A=[[1.0, 1.0], [0.0, 1.0]], B=[[0.0], [1.0]], E=[[1.0, 0.0], [1.0, 0.0]],
+        C=[[1.0, 0.0]], F=[[0.0, 1.0]], Cz=[[1.0, 1.0], [0.0, 0.0]], Dz=[[0.0], [1.0]],
+        inputs=("u",), disturbances=("w", "v"), measurements=("y",), outputs=("sum", "effort"),
+    )  # fmt: skip
+    return PublishedLQG(
+        plant=plant, minimise={"sum": weight, "effort": 1.0}, noise={"w": weight, "v": 1.0},
+        F=f * np.ones(2), K=f * np.ones(2),
+    )  # fmt: skip
+
+
+def h2_example() -> tuple[LinearPlant, dict[str, float], float]:
+    """K. Zhou and J. C. Doyle, Essentials of Robust Control, H2 example; its optimum is 8.9582.
+
+    As RobustAndOptimalControl.jl states it; every noise has the intensity one.
+    """
+    plant = LinearPlant(
+        A=[[-1.0, 0.0, 4.0], [0.0, 2.0, 0.0], [0.0, 0.0, -3.0]], B=np.ones((3, 1)),
+        E=[[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]], C=np.ones((1, 3)), F=[[0.0, 1.0]],
+        Cz=[[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]], Dz=[[0.0], [1.0]], inputs=("command",),
+        disturbances=("w", "n"), outputs=("z", "u"),
+    )  # fmt: skip
+    return plant, {"z": 1.0, "u": 1.0}, 8.9582
+
+
+def scherer(which: str) -> tuple[LinearPlant, dict[str, float], float]:
+    """C. Scherer, P. Gahinet and M. Chilali, IEEE TAC 42, 1997, example 7, with its H2 optima.
+
+    ``two outputs`` weighs x1 and u, ``three outputs`` x2, x3 and u; the noise has intensity one.
+    """
+    rows, optimum = {
+        "two outputs": ([[1.0, 0, 0, 0], [0, 0, 0, 1.0]], 13.0752),
+        "three outputs": ([[0, 1.0, 0, 0], [0, 0, 1.0, 0], [0, 0, 0, 1.0]], 7.7484),
+    }[which]
+    both = np.array(rows)
+    plant = LinearPlant(
+        A=[[0.0, 10.0, 2.0], [-1.0, 1.0, 0.0], [0.0, 2.0, -5.0]], B=[[0.0], [1.0], [0.0]],
+        E=[[1.0], [0.0], [1.0]], C=[[0.0, 1.0, 0.0]], F=[[2.0]], Cz=both[:, :3], Dz=both[:, 3:],
+    )  # fmt: skip
+    return plant, dict.fromkeys(plant.outputs, 1.0), optimum
