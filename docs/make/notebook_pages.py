@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import base64
 import hashlib
+import os
 import re
 import sys
 import time
@@ -74,6 +75,7 @@ def execute(path: Path) -> Any:
 
     notebook = nbformat.read(path, as_version=4)
     where = {"metadata": {"path": str(path.parent)}}
+    os.environ["STILLHOOK_PROGRESS"] = "0"  # a page has no use for bars
     nbclient.NotebookClient(
         notebook, timeout=SECONDS, kernel_name="python3", resources=where
     ).execute()

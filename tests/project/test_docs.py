@@ -27,6 +27,7 @@ PAGES = [path for path in [ROOT / "README.md", *DOCS] if path.exists()]
 #: Pages that run studies of seconds: CI's.
 STUDIES = {
     "compare",
+    "own-vessel",
     "quickstart",
     "robust",
     "simulation",

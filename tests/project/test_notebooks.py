@@ -74,7 +74,8 @@ def executed(path):
     from nbformat.v4 import new_code_cell
 
     notebook = read(path)
-    strict = new_code_cell("import warnings\nwarnings.simplefilter('error')")
+    quiet = "import os, warnings\nos.environ['STILLHOOK_PROGRESS'] = '0'"  # as for the pages
+    strict = new_code_cell(f"{quiet}\nwarnings.simplefilter('error')")
     lenient = new_code_cell("warnings.simplefilter('ignore')")  # the kernel's own, on its way out
     notebook.cells = [strict, *notebook.cells, lenient]
     client = nbclient.NotebookClient(
