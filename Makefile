@@ -51,7 +51,7 @@ test-ci: $(VENV)/.installed-dev test-page  ## notebooks, pages, whole studies: w
 	$(PY) -m pytest -m "ci and not slow and not page" $(PYTEST_ARGS)
 
 # One after the other: what is timed and what moves shall not wait for a neighbour.
-test-page: $(VENV)/.installed-dev $(VENV)/.installed-page-test  ## the design page, driven in chromium
+test-page: $(VENV)/.installed-dev $(VENV)/.installed-test-page  ## the design page, driven in chromium
 	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null || \
 	    { apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium; }
 	$(PY) -m pytest -m page tests/stillhook/page

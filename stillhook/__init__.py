@@ -17,6 +17,7 @@ from ._distribution import check_siblings
 check_siblings()
 
 from models.basics.lazy import lazy_face  # noqa: E402, once the packages are known to be ours
+from models.basics.progress import show_by_default  # noqa: E402
 
 from ._version import __version__ as __version__  # noqa: E402
 
@@ -63,5 +64,14 @@ if TYPE_CHECKING:
     from .runs import FailureModes, Runs, failure_modes, simulate, write_runs
     from .seas import load_windows, save_windows
     from .sweeps import fault_spread, resume_sweep, sweep, usual_spread
+    from .text import show_progress
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)
+
+    def _watched(what):
+        """Show a call that takes seconds where somebody watches; imported when there is one."""
+        from .text.watching import where_watched
+
+        return where_watched(what)
+
+    show_by_default(_watched)

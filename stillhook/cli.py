@@ -29,64 +29,98 @@ exit status: 0 all is well; 1 the design is not ok: unstable, infeasible, a
 limit broken, not verified; or a run diverged, or RAOs are doubtful or not
 checked; 2 bad input; 3 an error in Stillhook itself; 130 interrupted
 
-to begin with:
-  stillhook cases                     what comes with the toolkit
-  stillhook optimise subsea-crane     the gains of a winch that can do its job
-  stillhook simulate thesis-1975      a controller in the time domain
-  stillhook compare thesis-1975       all of them in the same seas
-  stillhook new my.yaml               a commented case file of your own
+examples, and more by stillhook COMMAND --help:
+  # the gains of a winch that can do its job
+  stillhook optimise subsea-crane
+  # all controllers in the same seas
+  stillhook compare thesis-1975
+  # a commented case file of your own
+  stillhook new my.yaml
 """
 
-
-#: Every command: its name, its room in `stillhook.commands`, what it does.
-COMMANDS = (
-    ("optimise", "design", "find the gains that hold the payload stillest within the limits"),
-    ("structures", "design", "compare controller structures on a case"),
-    ("evaluate", "design", "say what given gains do"),
-    ("robust", "design", "find one set of gains for many depths, loads and seas"),
-    ("margins", "design", "say how far the plant's numbers may be off before a design is unstable"),
-    ("sensitivity", "study", "say which numbers of the case matter most to a design"),
+#: The contents of the command line, by what somebody wants to do: a heading, and its commands:
+#: name, room in `stillhook.commands`, and what it does in one line of the help.
+CONTENTS = (
     (
-        "operability",
-        "study",
-        "say in which seas the winch can work, what limits it, and how much of the year",
+        "start here",
+        (
+            ("cases", "world", "list the bundled cases"),
+            ("new", "world", "write a commented case file that runs as it is"),
+            ("check", "world", "read a case, and show what follows from it"),
+            ("page", "design", "try gains, sea and limits with sliders, in the browser"),
+        ),
     ),
-    ("pareto", "design", "draw what stillness costs: torque, margin or delay"),
-    ("size", "design", "find the smallest motor and gear that meet a target"),
-    ("worth", "design", "say what each limit, sensor and delay is worth"),
-    ("simulate", "run", "simulate controllers in a sea, limits and all"),
-    ("compare", "study", "compare controllers in the same seas, limits and all"),
     (
-        "sweep",
-        "study",
-        "try a design or a controller on many cases: what is not known exactly, what fails",
+        "design a controller",
+        (
+            ("optimise", "design", "find the gains that hold the payload stillest within limits"),
+            ("evaluate", "design", "say what given gains do"),
+            ("structures", "design", "compare controller structures on a case"),
+            ("robust", "design", "find one set of gains for many depths, loads and seas"),
+            ("bound", "design", "say what no linear controller can do better than"),
+        ),
     ),
-    ("report", "study", "write all there is about a design as a report for clients: HTML and PDF"),
-    ("page", "design", "try gains, sea and limits with sliders, in the browser on this machine"),
     (
-        "export",
-        "study",
-        "write a controller, or the plant, for drives, PLCs and co-simulation: C, FMU, IEC 61131-3",
+        "try it in time",
+        (
+            ("simulate", "run", "simulate controllers in a sea, limits and all"),
+            ("compare", "study", "compare controllers in the same seas, limits and all"),
+            ("scenarios", "run", "list the operations and the controllers"),
+        ),
     ),
-    ("scenarios", "run", "list the operations and the controllers"),
-    ("bound", "design", "say what no linear controller can do better than"),
-    ("sea", "world", "read wave spectra: what they hold, scatter diagram, one of them"),
     (
-        "motion",
-        "world",
-        "show the hook's motion over headings, periods and sides, and what it asks of a winch",
+        "study it",
+        (
+            ("margins", "design", "say how far the plant may be off before a design is unstable"),
+            ("sensitivity", "study", "say which numbers of the case matter most to a design"),
+            ("sweep", "study", "try a design or a controller on thousands of cases"),
+            ("operability", "study", "say in which seas, and how often, the winch can work"),
+        ),
     ),
-    ("vessel", "", "read a vessel's RAOs from a file, or compute them from a hull"),
-    ("vessel import", "world", "read a vessel's RAOs, check them, and keep them in one convention"),
-    ("vessel hull", "world", "compute a vessel's RAOs from main dimensions or a mesh (extra: bem)"),
-    ("vessel list", "world", "list the bundled vessels"),
-    ("check", "world", "read a case, and show what follows from it"),
-    ("cases", "world", "list the bundled cases"),
-    ("new", "world", "write a commented case file that runs as it is"),
-    ("schema", "world", "write the JSON Schema of a case file, for editors"),
+    (
+        "choose a winch",
+        (
+            ("size", "design", "find the smallest motor and gear that meet a target"),
+            ("pareto", "design", "draw what stillness costs: torque, margin or delay"),
+            ("worth", "design", "say what each limit, sensor and delay is worth"),
+        ),
+    ),
+    (
+        "hand it over",
+        (
+            ("report", "study", "write all about a design as a report for clients: HTML, PDF"),
+            ("export", "study", "write a controller or the plant as C, FMU or IEC 61131-3"),
+        ),
+    ),
+    (
+        "vessels and seas",
+        (
+            ("motion", "world", "show the hook's motion over headings, periods and sides"),
+            ("sea", "world", "read wave spectra: what they hold, scatter diagram, one of them"),
+            ("vessel", "", "read a vessel's RAOs from a file, or compute them from a hull"),
+            ("vessel list", "world", "list the bundled vessels"),
+            ("vessel import", "world", "read RAOs, check them, keep them in one convention"),
+            ("vessel hull", "world", "compute RAOs from main dimensions or a mesh (extra: bem)"),
+        ),
+    ),
+    (
+        "editors and shells",
+        (
+            ("schema", "world", "write the JSON Schema of a case file, for editors"),
+            ("completion", "world", "write the completion of this command line for a shell"),
+        ),
+    ),
 )
+#: Every command: its name, its room in `stillhook.commands`, what it does.
+COMMANDS = tuple(row for _, rows in CONTENTS for row in rows)
 
-
+# Of commands that only have parts.
+_EXAMPLES = {
+    "vessel": (
+        ("stillhook vessel list", "the bundled vessels"),
+        ("stillhook vessel import osv-83m", "one of them, checked and drawn"),
+    )
+}
 _SPELT = {"optimize": "optimise"}
 
 
@@ -95,18 +129,23 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
 
     Only that command is imported, so that ``stillhook --help`` imports nothing.
     """
-    from ._version import __version__
-
     parser = argparse.ArgumentParser(
         prog="stillhook",
-        description="Keep the load on a vessel's hook still: gains for offshore winches.",
+        usage="stillhook [-h] [--version] [--debug] COMMAND ...",
+        description=_described(),
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--version", action="version", version=f"stillhook {__version__}")
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="show version and commit, and exit"
+    )
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    within = {"": parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")}
+    parser.set_defaults(parser=build_parser)
+    commands = parser.add_subparsers(
+        prog="stillhook", dest="command", metavar="COMMAND", help=argparse.SUPPRESS
+    )
+    within = {"": commands}
     plain = [word for word in words or () if not word.startswith("-")]
     for name, room, help in COMMANDS:
         first, _, second = name.partition(" ")
@@ -114,6 +153,8 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             second or first,
             help=help,
             description=f"{help[0].upper()}{help[1:]}.",
+            epilog=_examples(_EXAMPLES.get(name, ())),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )
         # Wherever it stands; without a default of its own, lest it undo the one before it.
@@ -129,9 +170,38 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
 
             module = f".commands.{room}.{name.replace(' ', '_')}"
             chosen = import_module(module, __package__)
+            added.epilog = _examples(getattr(chosen, "EXAMPLES", ()))
             declared(added, (*chosen.ARGUMENTS, EVERYWHERE))
             added.set_defaults(run=chosen.run)
     return parser
+
+
+class _Version(argparse.Action):
+    """Tells the version and, where it is known, the commit: looked for when asked."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *given: object) -> None:
+        """Print them and end."""
+        from ._version import __version__, commit
+
+        known = commit()
+        print(f"stillhook {__version__}{f' (commit {known})' if known else ''}")
+        parser.exit()
+
+
+def _described() -> str:
+    """Return what the command line is for, and its contents."""
+    lines = ["Keep the load on a vessel's hook still: gains for offshore winches."]
+    wide = max(len(name) for name, *_ in COMMANDS)
+    for heading, rows in CONTENTS:
+        lines += ["", f"{heading}:"]
+        lines += [f"  {name:{wide}}  {help}" for name, room, help in rows if room]
+    return "\n".join(lines)
+
+
+def _examples(rows: Sequence[tuple[str, str]]) -> str | None:
+    """Return commands under what they do, to stand at the end of a help."""
+    lines = [f"  # {comment}\n  {command}" for command, comment in rows]
+    return "\n".join(["examples:", *lines]) if lines else None
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -142,6 +212,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises SystemExit from the parser: with 0 for ``--help`` and ``--version``, with 2 for arguments
     that it does not understand.
     """
+    from models.basics.progress import unshown
+
     from .text import take_any_text
 
     words = _spelt(sys.argv[1:] if argv is None else argv)
@@ -154,7 +226,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             return BAD_INPUT
         if arguments.json:
             arguments.quiet = False  # what came of it is told whole
-        with warnings.catch_warnings():  # what a command sets about warnings ends with it
+        # What a command sets about warnings ends with it, and it shows its progress itself.
+        with warnings.catch_warnings(), unshown():
             status: int = arguments.run(arguments)
         # What is still in the buffer can fail too: a reader that has gone, a full disk.
         sys.stdout.flush()

@@ -64,6 +64,7 @@ if TYPE_CHECKING:
         zero_crossing_period,
     )
     from .panels import FrequencyAxis, cut_panels, longest_panel
+    from .progress import show_by_default, shows_progress, unshown
     from .quadrature import Quadrature, SpectralDensity, adaptive_nodes, spectral_nodes
     from .riccati import (
         balanced_truncation,

@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_choice, check_range
+from models.basics import FloatArray, InputError, check_choice, check_range, shows_progress
 from models.case import Case
 from models.operation import Motion
 from models.plant import DriveLimits, PlantData, stochastic_equivalent
@@ -41,6 +41,7 @@ _ROUNDS = 5  # of drag and motion
 _AGREED = 0.05  # relative change of the drag that ends them
 
 
+@shows_progress("the optimum of the record")
 def clairvoyant(
     case: Case,
     record: Motion,

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from models.basics import FloatArray, InputError, SolverError, check_range
+from models.basics import FloatArray, InputError, SolverError, check_range, shows_progress
 from models.case import Case
 
 from .planning import plan_model
@@ -117,6 +117,7 @@ class Weights:
         check_range("weights", "stiffness", self.stiffness, low=0.1, high=10.0)
 
 
+@shows_progress("tuning the weights")
 def tune_weights(
     case: Case,
     *,

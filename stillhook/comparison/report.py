@@ -12,6 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from models.basics import shows_progress
+
 from ..text import (
     Drawing,
     OutputFolder,
@@ -63,6 +65,7 @@ def comparison_report(found: Comparison) -> Report:
     )
 
 
+@shows_progress("drawing")
 def write_comparison(
     folder: str | Path | OutputFolder,
     found: Comparison,

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from models.basics import InputError, check_choice, check_range
+from models.basics import InputError, check_choice, check_range, shows_progress
 from models.case import Case
 from models.simulation import EASE
 
@@ -43,6 +43,7 @@ _FLOORS = 3  # seeds of which the floor is computed by default: it takes longer 
 _FULL = 0.1  # of the time [%]: less is as good as a drive without limits
 
 
+@shows_progress("comparing")
 def compare(
     case: Case,
     controllers: Sequence[object] | Literal["all"] | None = None,

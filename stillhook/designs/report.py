@@ -8,6 +8,7 @@ Whoever opens the folder a year later finds the question beside the answer.
 from collections.abc import Callable
 from pathlib import Path
 
+from models.basics import shows_progress
 from synth.design import Design
 
 from ..text import Drawing, OutputFolder, Report, ReportSection, markdown, pairs, pictures
@@ -84,6 +85,7 @@ def design_report(design: Design, *, bound: bool = True) -> Report:
     )
 
 
+@shows_progress("drawing")
 def write_design(
     folder: str | Path | OutputFolder,
     *,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from models.basics import InputError, check_range
+from models.basics import InputError, check_range, shows_progress
 from models.case import Case
 from models.plant import PlantData
 from models.run import Run
@@ -73,6 +73,7 @@ class Export:
         return all(one.proved for one in self.exported)
 
 
+@shows_progress("exporting")
 def export(
     what: Case | Design | Tuning | Controller,
     out: str | Path | OutputFolder,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from models.basics import InputError
+from models.basics import InputError, shows_progress
 from models.case import Case
 from synth.design import Design
 
@@ -33,6 +33,7 @@ HTML, PDF = "report.html", "report.pdf"
 NO_PDF = "report.pdf was not made: it needs typst: run `make report`; report.html prints on A4 too"
 
 
+@shows_progress("drawing")
 def write_report(
     out: str | Path | OutputFolder,
     *,

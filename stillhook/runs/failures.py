@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.basics import InputError, StillhookError, check_range, one_thread
+from models.basics import InputError, StillhookError, check_range, one_thread, shows_progress
 from models.case import Case
 from models.casefile import suggestion
 from models.operation import Scenario, scenario_named
@@ -149,6 +149,7 @@ def references(modes: FailureModes) -> list[str]:
     ]
 
 
+@shows_progress("failures")
 def failure_modes(
     case: Case,
     controller: str | Design | Tuning | Controller = "feedback",

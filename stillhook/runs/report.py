@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from models.basics import InputError, check_choice
+from models.basics import InputError, check_choice, shows_progress
 from models.case import Case
 from models.run import ERROR, FEWEST_MAXIMA, Run, write_csv, write_netcdf, write_parquet
 
@@ -145,6 +145,7 @@ def _own(controller: str, several: bool) -> str:
     return f"{folder_name(controller)}/" if several else ""
 
 
+@shows_progress("drawing")
 def write_runs(
     folder: str | Path,
     compared: Sequence[Runs],

@@ -15,7 +15,14 @@ from typing import Literal
 
 import numpy as np
 
-from models.basics import InputError, check_choice, check_range, check_seed, one_thread
+from models.basics import (
+    InputError,
+    check_choice,
+    check_range,
+    check_seed,
+    one_thread,
+    shows_progress,
+)
 from models.case import Case
 from models.casefile import Quantity
 from models.operation import MotionSource, Scenario, SpectrumMotion, scenario_named
@@ -155,6 +162,7 @@ def _with_quantities(run: Run, named: Mapping[str, NamedQuantity]) -> Run:
     return replace(run, statistics=replace(run.statistics, quantities=quantities))
 
 
+@shows_progress("simulating")
 def simulate(
     case: Case,
     controller: str | Design | Tuning | Controller = "feedback",

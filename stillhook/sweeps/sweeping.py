@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from models.basics import InputError, check_range, check_seed, pick
+from models.basics import InputError, check_range, check_seed, pick, shows_progress
 from models.case import Case
 from models.spread import METHODS, Spread
 from synth.design import Design
@@ -31,6 +31,7 @@ SAMPLES = {"frequency": 10_000, "time": 256}
 _LONGEST = 1e6  # run in time [s]
 
 
+@shows_progress("cases")
 def sweep(
     design: object,
     spread: Spread | Mapping[str, Any] | str | Path | None = None,
@@ -203,6 +204,7 @@ def sweep(
     return run_sweep(question, draw, engine=engine, jobs=jobs, store=store, progress=progress)
 
 
+@shows_progress("cases")
 def resume_sweep(
     store: str | Path,
     *,

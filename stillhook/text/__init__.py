@@ -67,5 +67,6 @@ if TYPE_CHECKING:
         remarks,
     )
     from .terminal import Progress, commands, console, progress, show, told_once
+    from .watching import show_progress
 else:
     __getattr__, __dir__, __all__ = lazy_face(__name__, __file__)

@@ -8,6 +8,7 @@ takes care of that, and of `NO_COLOR`.  It is imported where it is used, as it s
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import sys
 import warnings
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]
 
+SWITCH = "STILLHOOK_PROGRESS"  #: The variable that lets no bar be shown (0), or one anywhere (1).
 _STAGES = {
     "starts": "searching",
     "polish": "polishing the best",
@@ -140,14 +142,20 @@ def commands(rows: Sequence[tuple[str, str]], out: Console) -> None:
 
 @contextlib.contextmanager
 def progress(
-    *, shown: bool, pace: Callable[[float], str] | None = None
+    *,
+    shown: bool,
+    pace: Callable[[float], str] | None = None,
+    out: Console | None = None,
+    first: str = "building the plant",
 ) -> Iterator[Callable[[str, float, float], None]]:
     """Show a progress bar on a terminal's standard error; yield what is told (stage, done, total).
 
     `pace` has words for what is done in a second, beside the time that is left; without it the time
-    since the beginning is shown.
+    since the beginning is shown.  `out` is another place, `first` what is being done until a stage
+    is told.
     """
-    out = console(stderr=True)
+    if out is None:
+        out, shown = console(stderr=True), shown and os.environ.get(SWITCH) != "0"
     if not (shown and out.is_terminal):
         yield lambda stage, done, total: None
         return
@@ -166,9 +174,16 @@ def progress(
         *clock,
     )
     # The pace is that of minutes: designs and predictive controllers come in lumps.
-    shows = bars.Progress(*columns, console=out, transient=True, speed_estimate_period=300.0)
+    shows = bars.Progress(
+        *columns,
+        console=out,
+        transient=True,
+        speed_estimate_period=300.0,
+        # What is printed meanwhile goes above the bar, and into a pipe where it is piped.
+        redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
+    )
     with shows:
-        task = shows.add_task("building the plant", total=None)
+        task = shows.add_task(first, total=None)
         seen = -1.0
 
         def tell(stage: str, done: float, total: float) -> None:

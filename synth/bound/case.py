@@ -36,6 +36,7 @@ from models.basics import (
     check_range,
     one_thread,
     pick,
+    shows_progress,
 )
 from models.case import Case
 from models.hook import HookMotion
@@ -265,6 +266,7 @@ class _Terms:
 
 
 @one_thread()
+@shows_progress("the best possible")
 def bound_for(
     subject: Case | _Judged,
     *,

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.optimize import brentq
 
-from models.basics import InputError, check_range, digits_apart, one_thread
+from models.basics import InputError, check_range, digits_apart, one_thread, shows_progress
 from models.case import Case
 from models.plant import MAX_MASSES
 
@@ -69,6 +69,7 @@ _D = TypeVar("_D", bound=Design)
 
 
 @one_thread()
+@shows_progress("searching")
 def optimise_gains(
     case: Case,
     structure: str | Sequence[str] | None = None,

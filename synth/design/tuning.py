@@ -15,7 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import InputError, SolverError, White, check_range, digits_apart, one_thread
+from models.basics import (
+    InputError,
+    SolverError,
+    White,
+    check_range,
+    digits_apart,
+    one_thread,
+    shows_progress,
+)
 from models.plant import LinearPlant
 
 from ..bound import lqg_bound
@@ -131,6 +139,7 @@ class Tuning:
         return "\n".join(lines)
 
 
+@shows_progress("searching")
 def tune(
     plant: LinearPlant | Sequence[LinearPlant],
     structure: Structure,

@@ -21,7 +21,14 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.special import ndtr
 
-from models.basics import InputError, SolverError, check_ascending, check_range, one_thread
+from models.basics import (
+    InputError,
+    SolverError,
+    check_ascending,
+    check_range,
+    one_thread,
+    shows_progress,
+)
 from models.case import Case
 from models.sea import SHORTEST, Scatter, SeaSeries, read_scatter
 
@@ -56,6 +63,7 @@ _STARTS = 3  # of each search, besides the design's own gains
 
 
 @one_thread()
+@shows_progress("limiting seas")
 def operability(
     design: Design | Case,
     *,

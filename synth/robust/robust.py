@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.basics import InputError, check_range, one_thread
+from models.basics import InputError, check_range, one_thread, shows_progress
 from models.case import Case
 
 from ..design import Design, LimitUse, Tuning, design_of, gains_in_use, tuning_of
@@ -243,6 +243,7 @@ _ENDS = 3  # ends of a search that the next one begins from, besides its answer
 
 
 @one_thread()
+@shows_progress("searching")
 def optimise_robust(
     case: Case,
     family: Family,

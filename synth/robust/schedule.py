@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from models.basics import FloatArray, InputError, check_range, one_thread, read_only
+from models.basics import FloatArray, InputError, check_range, one_thread, read_only, shows_progress
 from models.case import Case
 
 from ..design import gains_in_use
@@ -186,6 +186,7 @@ def blend_of(nodes: npt.ArrayLike, length: float) -> FloatArray:
 
 
 @one_thread()
+@shows_progress("searching")
 def schedule_gains(
     case: Case,
     lengths: tuple[float, float],

@@ -27,6 +27,7 @@ from models.basics import (
     one_thread,
     parse_quantity,
     share,
+    shows_progress,
 )
 from models.sensing import sensed_plant
 from models.spread import DRAG, GAINS, Samples, Spread, Uniform, field_of
@@ -127,6 +128,7 @@ class Robustness:
 
 
 @one_thread()
+@shows_progress("looking for what hurts most")
 def robustness(
     design: Design,
     uncertainty: Mapping[str, float | str],

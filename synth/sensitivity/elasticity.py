@@ -25,7 +25,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import InputError
+from models.basics import InputError, shows_progress
 
 from ..design import Design
 from ..loop import switching_friction
@@ -165,6 +165,7 @@ _TIE = 0.999  # peaks of this share of the largest count as tied
 _SECOND = 0.01  # share of a number for its second derivative
 
 
+@shows_progress("sensitivities")
 def sensitivity(
     design: Design, *, second: int = 0, progress: Progress | None = None
 ) -> Sensitivity:

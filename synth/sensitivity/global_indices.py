@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range
+from models.basics import FloatArray, InputError, ReadOnlyArrays, check_range, shows_progress
 from models.spread import Spread
 
 from ..design import Design
@@ -89,6 +89,7 @@ class SobolIndices(ReadOnlyArrays):
         return "\n".join(lines)
 
 
+@shows_progress("Sobol indices")
 def sobol_indices(
     design: Design,
     spread: Spread,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.basics import FloatArray, ReadOnlyArrays, check_range
+from models.basics import FloatArray, ReadOnlyArrays, check_range, shows_progress
 from models.spread import Spread
 
 from ..design import Design
@@ -53,6 +53,7 @@ class Screening(ReadOnlyArrays):
         return "\n".join(lines)
 
 
+@shows_progress("screening")
 def morris_screening(
     design: Design,
     spread: Spread,

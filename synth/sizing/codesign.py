@@ -19,7 +19,7 @@ from functools import partial
 
 import numpy as np
 
-from models.basics import InputError, check_range, one_thread
+from models.basics import InputError, check_range, one_thread, shows_progress
 from models.case import Case
 
 from ..design import Design, optimise_gains
@@ -124,6 +124,7 @@ class _Gears:
 
 
 @one_thread()
+@shows_progress("searching")
 def co_design(
     case: Case,
     *,

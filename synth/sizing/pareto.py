@@ -15,7 +15,14 @@ from functools import cached_property
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, SynthesisError, check_range, one_thread
+from models.basics import (
+    FloatArray,
+    InputError,
+    SynthesisError,
+    check_range,
+    one_thread,
+    shows_progress,
+)
 from models.case import Case
 
 from ..limits import DelayMargin, Limit, MaxSensitivity, Rms
@@ -235,6 +242,7 @@ class ParetoFront:
 
 
 @one_thread()
+@shows_progress("searching")
 def pareto_front(
     case: Case,
     against: str = "torque",

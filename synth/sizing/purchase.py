@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from models.basics import InputError, one_thread
+from models.basics import InputError, one_thread, shows_progress
 from models.case import Case
 
 from ..design import Design, optimise_gains
@@ -214,6 +214,7 @@ class Worth:
 
 
 @one_thread()
+@shows_progress("searching")
 def worth(
     case: Case | Design,
     *,

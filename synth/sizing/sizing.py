@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from models.basics import FloatArray, InputError, check_range, one_thread
+from models.basics import FloatArray, InputError, check_range, one_thread, shows_progress
 from models.case import Case
 from models.plant import MAX_MASSES
 
@@ -114,6 +114,7 @@ class _Search:
 
 
 @one_thread()
+@shows_progress("searching")
 def size_winch(
     case: Case,
     *,

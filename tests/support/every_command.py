@@ -39,6 +39,7 @@ LINES = (
     "cases",
     "new my.yaml",
     "schema",
+    "completion bash",
 )
 
 RECORD = """

@@ -22,6 +22,7 @@ from ...basics import (
     InputError,
     check_ascending,
     check_range,
+    shows_progress,
 )
 from ..raos import VesselRaos
 from .bem import Progress, cached_hydrodynamics, shortest_wave, versions
@@ -60,6 +61,7 @@ class HullVessel:
         return self.loading.metacentric_heights(self.waterplane)
 
 
+@shows_progress("frequencies")
 def vessel_from_hull(
     hull: Hull,
     *,

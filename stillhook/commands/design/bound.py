@@ -21,6 +21,9 @@ ARGUMENTS = (
         faint=within(low=0.0, open_low=True),
     ),
 )
+EXAMPLES = (
+    ("stillhook bound thesis-1975", "the least motion that any linear controller can leave"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

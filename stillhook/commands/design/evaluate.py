@@ -13,6 +13,13 @@ ARGUMENTS = (
     options("--out DIR  folder for the results (default: none)"),
     NO_BOUND,
 )
+EXAMPLES = (
+    ("stillhook evaluate thesis-1975", "the gains that a case has in use, held against its limits"),
+    (
+        "stillhook evaluate thesis-1975 --gains A=200,a=30,a1=60,a2=60 --no-bound",
+        "other gains, at once",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -22,6 +22,13 @@ ARGUMENTS = (
         draws=within(low=0, high=1_000_000),
     ),
 )
+EXAMPLES = (
+    ("stillhook margins thesis-1975 --draws 100", "how far mass, stiffness and drag may be off"),
+    (
+        "stillhook margins thesis-1975 --off payload.mass=0.5 --off 'delay=20 ms'",
+        "half the mass more or less, and telemetry 20 ms later",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

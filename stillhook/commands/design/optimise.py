@@ -41,6 +41,16 @@ ARGUMENTS = (
     _FAMILY,
     NO_BOUND,
 )
+EXAMPLES = (
+    (
+        "stillhook optimise subsea-crane",
+        "the best gains, with figures and a report: a minute or two",
+    ),
+    (
+        "stillhook optimise thesis-1975 --structure payload-feedback --starts 4",
+        "one structure and a short search: seconds",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

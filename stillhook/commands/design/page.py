@@ -23,6 +23,10 @@ ARGUMENTS = (
         port=within(low=0, high=65535),
     ),
 )
+EXAMPLES = (
+    ("stillhook page", "the bundled crane's design with sliders, until Ctrl-C"),
+    ("stillhook page thesis-1975 --no-open", "another case; the address is printed"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -21,6 +21,9 @@ ARGUMENTS = (
         between=parse_range,
     ),
 )
+EXAMPLES = (
+    ("stillhook pareto thesis-1975 --points 4", "what less motion costs in torque, at four points"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

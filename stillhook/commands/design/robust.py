@@ -39,6 +39,12 @@ ARGUMENTS = (
         schedule=parse_range,
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook robust thesis-1975 --vary payload.mass=30t..40t --starts 2",
+        "one set of gains for every load from 30 to 40 t",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -41,6 +41,12 @@ ARGUMENTS = (
         radius=parse_range,
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook size thesis-1975 --target '150 mm' --hs '1 m' --points 3 --starts 1",
+        "the smallest motor that leaves 150 mm in a sea of 1 m",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -33,6 +33,12 @@ ARGUMENTS = (
     ),
     NO_BOUND,
 )
+EXAMPLES = (
+    (
+        "stillhook structures thesis-1975 --structures payload-feedback,low-order-2",
+        "two structures, each with the best gains of its own",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -26,6 +26,12 @@ ARGUMENTS = (
         """
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook worth thesis-1975 --starts 1",
+        "what a better sensor, a shorter delay or a larger motor would bring",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

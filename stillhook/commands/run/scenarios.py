@@ -12,6 +12,10 @@ from ..declare import options
 from ..working import conclude
 
 ARGUMENTS = (options("[name]  an operation, to see its options"),)
+EXAMPLES = (
+    ("stillhook scenarios", "what can be simulated, and who can control it"),
+    ("stillhook scenarios landing", "the options of one operation"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

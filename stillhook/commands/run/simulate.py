@@ -108,6 +108,16 @@ ARGUMENTS = (
         store_step=TIME,
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook simulate thesis-1975 --duration '2 min'",
+        "two minutes with the gains in use, figures in out/thesis-1975-hold",
+    ),
+    (
+        "stillhook simulate thesis-1975 --controller none,mpc --duration '2 min'",
+        "the drum held against predictive control, in the same sea",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -78,6 +78,13 @@ ARGUMENTS = (
         hs=numbers(),
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook compare thesis-1975 --controllers none,thesis,mpc --seeds 2",
+        "three controllers in the same two seas",
+    ),
+    ("stillhook compare thesis-1975 --list", "who can take part"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -63,6 +63,13 @@ ARGUMENTS = (
         duration=quantity("time", 60.0, 3.0 * 3600.0),
     ),
 )
+EXAMPLES = (
+    ("stillhook export thesis-1975", "the gains in use as C99, with a README and a test"),
+    (
+        "stillhook export thesis-1975 --to st,mat",
+        "as structured text for a PLC, and as state space",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -58,6 +58,12 @@ ARGUMENTS = (
         highest=_HEIGHT,
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook operability thesis-1975 --tp 7,9,11 --payload-rms '100 mm'",
+        "the highest sea at three peak periods that leaves the payload 100 mm",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

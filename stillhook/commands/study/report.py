@@ -79,6 +79,12 @@ ARGUMENTS = (
     WEATHER,
     _BLOCK,
 )
+EXAMPLES = (
+    (
+        "stillhook report thesis-1975 --without comparison,operability,failures",
+        "a report without its longest chapters, as HTML and PDF",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

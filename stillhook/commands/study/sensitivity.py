@@ -51,6 +51,7 @@ ARGUMENTS = (
     ),
     options("--out DIR  folder for the results (default: out/<case>-sensitivity)"),
 )
+EXAMPLES = (("stillhook sensitivity thesis-1975", "which numbers of the case to measure first"),)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -98,6 +98,17 @@ ARGUMENTS = (
         worst=within(low=0, high=_MOST),
     ),
 )
+EXAMPLES = (
+    ("stillhook sweep thesis-1975 --samples 1000", "a thousand plants that are a little off"),
+    (
+        "stillhook sweep thesis-1975 --samples 1000 --vary payload.mass=30%",
+        "of which only the mass is not known",
+    ),
+    (
+        "stillhook sweep thesis-1975 --mode time --samples 4 --duration '1 min'",
+        "nonlinear runs in time instead",
+    ),
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

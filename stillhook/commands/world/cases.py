@@ -7,6 +7,7 @@ from ..declare import Declaration
 from ..working import conclude
 
 ARGUMENTS: tuple[Declaration, ...] = ()
+EXAMPLES = (("stillhook cases", "the cases that come with the toolkit"),)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -43,6 +43,10 @@ _PLACES = {
 _DIGITS = 12  # of a case's hash that are shown
 
 ARGUMENTS = (CASE,)
+EXAMPLES = (
+    ("stillhook check subsea-crane", "what follows from a case before any gain is chosen"),
+    ("stillhook check thesis-1975 --set 'rope.length=1500 m'", "the same with one number changed"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -35,6 +35,12 @@ ARGUMENTS = (
         tp=axis(1.0, 1.0, 40.0),
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook motion subsea-crane --tp 6..12",
+        "how fast a winch would have to be, over headings and periods",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -10,6 +10,9 @@ from ..declare import options
 from ..working import conclude
 
 ARGUMENTS = (options("file  the file to write"),)
+EXAMPLES = (
+    ("stillhook new my.yaml", "a case of your own to begin with, a comment beside each field"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -9,6 +9,10 @@ from ..working import conclude
 from .new import written
 
 ARGUMENTS = (options("[file]  the file to write (default: standard output)"),)
+EXAMPLES = (
+    ("stillhook schema", "the schema on standard output"),
+    ("stillhook schema case.schema.json", "or in a file, that an editor checks case files by"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

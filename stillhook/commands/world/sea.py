@@ -42,6 +42,7 @@ ARGUMENTS = (
         period_step=within(**_STEP),
     ),
 )
+EXAMPLES = (("stillhook sea subsea-crane", "the sea of a case"),)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -67,6 +67,12 @@ ARGUMENTS = (
         threads=within(low=1, high=1024),
     ),
 )
+EXAMPLES = (
+    (
+        "stillhook vessel hull --length 80 --beam 18 --draught 6 --kg 6 --panels 150",
+        "a ship of these main dimensions, in few panels",
+    ),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -46,6 +46,9 @@ ARGUMENTS = (
         roll_damping=within(),
     ),
 )
+EXAMPLES = (
+    ("stillhook vessel import osv-83m", "a bundled vessel: its RAOs checked, drawn and kept"),
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ from ..declare import Declaration
 from ..working import conclude
 
 ARGUMENTS: tuple[Declaration, ...] = ()
+EXAMPLES = (("stillhook vessel list", "the vessels that come with the toolkit"),)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -69,6 +69,7 @@ NONE = (
     "cases",
     "new",
     "schema",
+    "completion",
 )
 
 NOT_A_NUMBER = re.compile(r"(?<![\w.-])[+-]?(nan|inf|NaN|Infinity|None)(?![\w-])")
