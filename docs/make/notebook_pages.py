@@ -178,6 +178,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Execute what has changed, and write its pages."""
     parser = argparse.ArgumentParser(description="Write the notebooks' pages, executed.")
     parser.add_argument("--all", action="store_true", help="whether anything changed or not")
+    parser.add_argument("--quick", action="store_true", help="the first notebook alone")
     parser.add_argument("--jobs", type=int, default=2, help="notebooks at a time")
     asked = parser.parse_args(arguments)
     paths = sources()
@@ -185,6 +186,7 @@ def main(arguments: list[str] | None = None) -> int:
     for page_file in PAGES.glob("[0-9][0-9]-*.md"):
         if page_file.stem not in known:  # of a notebook that is gone
             page_file.unlink()
+    paths = paths[:1] if asked.quick else paths
     code = code_digest()
     changed = {path: digest(path, code) for path in paths} if asked.all else stale(paths)
     KEPT.mkdir(parents=True, exist_ok=True)

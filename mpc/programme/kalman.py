@@ -140,8 +140,8 @@ class SampledFilter:
     def begin_with(self, P: FloatArray, samples: int) -> None:
         """Take a covariance (n, n) as that of the first prediction, and hold what follows from it.
 
-        For so many samples the gains with all signals are made beforehand; the covariance is
-        carried on from P itself as soon as one of the signals is missing among them.
+        For so many samples the gains with all signals are made beforehand; as soon as one of the
+        signals is missing among them, the covariance is carried on from what it is by then.
         """
         self._start = self._P = P / self._outer
         everything = np.ones(len(self._R), dtype=np.bool_)
@@ -176,9 +176,13 @@ class SampledFilter:
         """
         self.unheard = np.where(there, 0, self.unheard + 1)
         if self._heard < len(self._first) and not there.all():
-            # What they hold of the constants would be lost on a steady gain.
+            # What they hold of the constants would be lost on a steady gain: the covariance of now,
+            # which has not been kept for each of them.
+            everything, heard = np.ones_like(there), self._heard
+            self._begin()
             self._P, self._heard = self._start, len(self._first)
-            self._seen = self._spread = None  # of another covariance
+            for _ in range(heard):
+                self.at(everything)
         if self._heard < len(self._first):
             gain = self._first[self._heard]
             self._heard += 1

@@ -184,10 +184,14 @@ void mpc_filter_correct(mpc_filter *f, const double *ahead, const double *error,
     all = all && there[i];
   }
   if (f->heard < MPC_FIRST && !all) {
-    /* What they hold of the constants would be lost on a steady gain. */
+    /* What they hold of the constants would be lost on a steady gain: the covariance of now, which
+       has not been kept for each of them. */
+    int everything[NY];
+    for (i = 0; i < NY; i++) everything[i] = 1;
+    begin(f);
     memcpy(f->P, mpc_start, sizeof f->P);
+    for (i = 0; i < f->heard; i++) gain_at(f, everything, NULL, gain);
     f->heard = MPC_FIRST;
-    f->has_seen = f->has_spread = 0; /* of another covariance */
   }
   if (f->heard < MPC_FIRST)
     K = mpc_first_gains + (size_t)f->heard++ * N * NY;
