@@ -10,7 +10,7 @@ from ..basics.lazy import lazy_face
 
 if TYPE_CHECKING:
     from .closed_loop import STATUS, own_parameters
-    from .compiler import Compiler, find_compiler
+    from .compiler import Compiler, compile_into, find_compiler
     from .integrate import braked_step, disturbances
     from .kernel import Kernel
     from .simulate import Progress, run_simulation

@@ -22,7 +22,7 @@ import stat
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -112,8 +112,9 @@ def load_library(
             if found is not None:
                 return found
             with tempfile.TemporaryDirectory(prefix="build-", dir=folder) as scratch:
-                contents = {name: text.encode() for name, text in files.items()} | copied
-                built = _build(contents, compiler, flags, links, Path(scratch))
+                sources = [name for name in files if name.endswith(".c")]
+                words, name = (*flags, *sources, *links, "-lm"), f"kernel{_suffix()}"
+                built = compile_into(Path(scratch), {**files, **copied}, words, name, compiler)
                 built.chmod(0o700)
                 library = folder / _name(key, built.read_bytes())
                 os.replace(built, library)
@@ -146,29 +147,48 @@ def _load_kept(folder: Path, key: str) -> ctypes.CDLL | None:
     return None
 
 
-def _build(
-    contents: Mapping[str, bytes],
-    compiler: Compiler,
-    flags: tuple[str, ...],
-    links: tuple[str, ...],
+def compile_into(
     folder: Path,
+    contents: Mapping[str, str | bytes],
+    words: Sequence[str],
+    built: str,
+    compiler: Compiler,
+    *,
+    failure: str | None = None,
 ) -> Path:
-    """Return the library, compiled in a folder that holds nothing else."""
+    """Write sources and what goes with them into a folder, and compile them there.
+
+    Parameters
+    ----------
+    folder
+        A folder that holds nothing else.
+    contents
+        Texts and bytes by path within it.
+    words
+        What the compiler is told besides what it is to build: flags, sources, libraries.
+    built
+        The file that it is to build.
+    compiler, failure
+        Who does it, and what an error begins with.
+
+    Raises
+    ------
+    SolverError
+        If the compiler fails; its first words are quoted.
+    """
     for name, content in contents.items():
         place = folder / name
         place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_bytes(content)
-    built = folder / f"kernel{_suffix()}"
-    sources = [name for name in contents if name.endswith(".c")]
-    command = (*compiler.command, *flags, "-o", built.name, *sources, *links, "-lm")
+        place.write_bytes(content.encode() if isinstance(content, str) else content)
+    owner = failure or f"C compiler: {compiler.command[0]} failed"
     try:
-        answer = _run(command, folder, TIME_LIMIT)
+        answer = _run((*compiler.command, "-o", built, *words), folder, TIME_LIMIT)
     except (OSError, subprocess.SubprocessError) as error:
-        raise SolverError(f"C compiler: {compiler.command[0]} failed: {error}") from error
-    if answer.returncode != 0 or not built.exists():
+        raise SolverError(f"{owner}: {error}") from error
+    if answer.returncode != 0 or not (folder / built).exists():
         said = _first_line(answer.stderr) or f"it ended with code {answer.returncode}"
-        raise SolverError(f"C compiler: {compiler.command[0]} failed: {said}")
-    return built
+        raise SolverError(f"{owner}: {said}")
+    return folder / built
 
 
 def _run(

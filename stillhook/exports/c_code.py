@@ -12,7 +12,7 @@ from pathlib import Path
 
 from models.basics import SolverError
 from models.sensing import NativeLaw
-from models.simulation import Compiler, find_compiler
+from models.simulation import Compiler, compile_into, find_compiler
 
 from .exported import Exported
 from .facts import facts_of
@@ -27,7 +27,7 @@ EXACT = ("-std=c99", "-O2", "-ffp-contract=off")
 TOLERANCE = 1e-12
 #: The same of predictive control, whose solver ends where the optimality conditions hold that well.
 PREDICTIVE = 1e-6
-_LIMIT = 300.0  # of compiling and replaying [s]
+_LIMIT = 300.0  # of replaying [s]
 _WIDTH = 78
 
 _MAIN = r"""/* Replays the recording and compares: ./{prefix} [FILE, by default vector.csv] */
@@ -198,13 +198,10 @@ def replayed(native: NativeLaw, files: Mapping[str, str | bytes], compiler: Comp
     """
     with tempfile.TemporaryDirectory(prefix="stillhook-") as name:
         folder = Path(name)
-        for path, content in files.items():
-            place = folder / path
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content.encode() if isinstance(content, str) else content)
-        build = [*compiler.command, *EXACT, "-o", "replay", "main.c", *native.sources]
-        _run([*build, *native.links, "-lm"], folder, "it cannot be compiled")
-        said = _run([str(folder / "replay"), VECTOR], folder, "the replay finds other commands")
+        words = [*EXACT, "main.c", *native.sources, *native.links, "-lm"]
+        failure = "export: c: it cannot be compiled"
+        program = compile_into(folder, files, words, "replay", compiler, failure=failure)
+        said = _replay(program)
     count, worst, _ = said.splitlines()
     size = float(worst.split()[2])
     found = "the same commands to the last bit" if size == 0.0 else f"commands within {size:.2g}"
@@ -215,16 +212,26 @@ def replayed(native: NativeLaw, files: Mapping[str, str | bytes], compiler: Comp
     )
 
 
-def _run(command: list[str], folder: Path, failure: str) -> str:
+def _replay(program: Path) -> str:
+    """Return what a program says of the recording beside it.
+
+    Raises SolverError if it finds other commands, or does not run.
+    """
+    failure = "export: c: the replay finds other commands"
     try:
         answer = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=_LIMIT, check=False
+            [str(program), VECTOR],
+            cwd=program.parent,
+            capture_output=True,
+            text=True,
+            timeout=_LIMIT,
+            check=False,
         )
     except (OSError, subprocess.SubprocessError) as error:
-        raise SolverError(f"export: c: {failure}: {error}") from error
+        raise SolverError(f"{failure}: {error}") from error
     if answer.returncode != 0:
         said = " ".join((answer.stderr or answer.stdout).split())[:300]
-        raise SolverError(f"export: c: {failure}: {said}")
+        raise SolverError(f"{failure}: {said}")
     return answer.stdout
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from models.basics.lazy import lazy_face
 
 if TYPE_CHECKING:
+    from .channel import close, how_it_ended, receive, send, served, started
     from .cluster import Cluster
     from .digest import code_digest, versions
     from .journal import Journal, question_in

@@ -23,9 +23,9 @@ from typing_extensions import override
 
 from models.basics import InputError, SolverError, check_range, how_to_install
 
+from .channel import full_paths
 from .digest import code_digest
 from .pool import POLL, Bench, Died, Pool, Task
-from .processes import full_paths
 
 _AHEAD = 3  # tasks under way for each thread of the cluster
 _PATIENCE = 60.0  # for a scheduler to answer and to have a worker [s]

@@ -1,44 +1,27 @@
 """Processes of this machine as a pool, each with one thread of linear algebra.
 
-    Processes.submit --(length, pickle)--> serve, in a process of its own --(length, pickle)--> wait
+    Processes.submit --(`channel`)--> serve, in a process of its own --(`channel`)--> wait
 
-A process is started with the path of its parent and nothing else: neither the parent's memory nor
-its main script, so that it works the same on every system, from a script without a main guard,
-from a notebook and from the command line.  It starts isolated (``-I``), and of the path it has the
-folders that are named in full: a ``json.py`` beside somebody's case files is not run.  Each has one
-thread here that hands it a task and waits for the answer, so that it is known which task a process
-died of.  The processes have a session of their own: Ctrl-C reaches the parent alone, which ends
-them.
+Each has one thread here that hands it a task and waits for the answer, so that it is known which
+task a process died of.
 """
 
 from __future__ import annotations
 
-import contextlib
-import json
-import os
 import pickle
 import queue
-import signal
-import struct
-import subprocess
-import sys
 import tempfile
 import threading
-from collections.abc import Hashable, Iterable
-from typing import IO, Any
+from collections.abc import Hashable
+from contextlib import suppress
+from typing import Any
 
 from typing_extensions import override
 
 from models.basics import InputError
 
+from .channel import close, how_it_ended, receive, send, served, started
 from .pool import Bench, Died, Pool, Task, usable_cores
-
-_START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from stillhook.keeper.processes import serve; serve()"
-)
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_LENGTH = struct.Struct(">Q")
 
 
 class _Process:
@@ -49,14 +32,7 @@ class _Process:
         self._answers = answers
         self._tasks: queue.Queue[tuple[Task, bytes] | None] = queue.Queue()
         self._said = tempfile.TemporaryFile()  # noqa: SIM115
-        self._process = subprocess.Popen(
-            [sys.executable, "-I", "-c", _START, json.dumps(full_paths(sys.path))],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            env={**os.environ, **dict.fromkeys(_THREADS, "1")},
-            start_new_session=True,
-        )
+        self._process = started(__name__, self._said)
         self._bench = bench
         self._thread = threading.Thread(target=self._talk, daemon=True)
         self._thread.start()
@@ -75,10 +51,7 @@ class _Process:
         self._process.kill()
         self._process.wait()
         self._thread.join()
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                with contextlib.suppress(OSError):
-                    stream.close()
+        close(self._process)
         self._said.close()
 
     def _talk(self) -> None:
@@ -90,10 +63,10 @@ class _Process:
             task, packed = given
             try:
                 if fresh:
-                    _send(into, self._bench)
+                    send(into, self._bench)
                     fresh = False
-                _send(into, packed)
-                answer = _receive(out)
+                send(into, packed)
+                answer = receive(out)
             except (EOFError, OSError, ValueError):
                 answer = Died(reason=self._obituary())
             self._answers.put((self, task, answer))
@@ -103,13 +76,12 @@ class _Process:
     def _obituary(self) -> str:
         """Return what the process died of."""
         code = self._process.wait()
+        how = f"its process {how_it_ended(code)}"
         if code < 0:
-            with contextlib.suppress(ValueError):
-                return f"its process was ended by {signal.Signals(-code).name}"
+            return how
         self._said.seek(0)
         lines = self._said.read().decode("utf-8", "replace").strip().splitlines()
-        said = f": {lines[-1].strip()}" if lines else ""
-        return f"its process ended with status {code}{said}"
+        return f"{how}: {lines[-1].strip()}" if lines else how
 
 
 class Processes(Pool):
@@ -181,21 +153,13 @@ class Processes(Pool):
         return task, answer
 
 
-def full_paths(paths: Iterable[str]) -> list[str]:
-    """Return the folders that are named in full: not the current one, nor what starts from it."""
-    return [path for path in paths if os.path.isabs(path)]
-
-
 def serve() -> None:
     """Answer tasks until there are no more; the first message is the bench."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever a controller prints must not come among the answers
-    tasks = sys.stdin.buffer
-    with contextlib.suppress(EOFError, BrokenPipeError):
-        bench = _receive(tasks)
+    tasks, answers = served()
+    with suppress(EOFError, BrokenPipeError):
+        bench = receive(tasks)
         while True:
-            _send(answers, pickle.dumps(bench.do(_receive(tasks))))
+            send(answers, pickle.dumps(bench.do(receive(tasks))))
 
 
 def _packed(content: object) -> bytes:
@@ -209,23 +173,3 @@ def _packed(content: object) -> bytes:
         raise InputError(
             f"jobs: the work cannot be sent to other processes, take one job: {error}"
         ) from error
-
-
-def _send(stream: IO[bytes], data: bytes) -> None:
-    stream.write(_LENGTH.pack(len(data)) + data)
-    stream.flush()
-
-
-def _receive(stream: IO[bytes]) -> Any:
-    """Read what was pickled and written with `_send`.
-
-    Raises EOFError if the other end is gone.
-    """
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        raise EOFError
-    (length,) = _LENGTH.unpack(head)
-    data = stream.read(length)
-    if len(data) < length:
-        raise EOFError
-    return pickle.loads(data)

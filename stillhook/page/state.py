@@ -99,7 +99,7 @@ _FIELDS = (
         low=0.0,
         high=360.0,
         step=5.0,
-        help="Where the waves come from, by the vessel: 180 is head sea, 90 from starboard.",
+        help="Where the waves travel to, from the bow: 180 is a head sea, 90 comes from starboard.",
     ),
     _Field(
         path="rope.length",

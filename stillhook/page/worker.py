@@ -4,34 +4,24 @@
                     <--("progress" | "done" | "failed", ...)--
 
 A job is cancelled by ending its process, which always works; the next job starts another.  A
-process that dies of itself, or is killed, is told as such and the page lives on.  It is started
-isolated (``-I``), as those of `stillhook.keeper` are: a ``json.py`` beside the case files is not
-run.
+process that dies of itself, or is killed, is told as such and the page lives on.  It is one of
+those that `stillhook.keeper` starts.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 import pickle
-import signal
-import struct
 import subprocess
-import sys
 import threading
 import warnings
 from collections.abc import Callable
-from typing import IO, Any
+from typing import Any
 
 from models.basics import StillhookError
 
-_START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from stillhook.page.worker import serve; serve()"
-)
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_LENGTH = struct.Struct(">Q")
+from ..keeper import close, how_it_ended, receive, send, served, started
 
 Told = Callable[[str, int, int], None]  #: Takes stage, done and total.
 
@@ -101,17 +91,7 @@ class Worker:
         if self._process is not None and self._process.poll() is not None:
             self._drop()
         if self._process is None:
-            import json
-
-            paths = [path for path in sys.path if os.path.isabs(path)]
-            self._process = subprocess.Popen(
-                [sys.executable, "-I", "-c", _START, json.dumps(paths)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env={**os.environ, **dict.fromkeys(_THREADS, "1")},
-                start_new_session=True,
-            )
+            self._process = started(__name__, subprocess.DEVNULL)
         return self._process
 
     def _talk(self, job: tuple[str, tuple[Any, ...]], tell: Told, ends: int) -> Any:
@@ -123,19 +103,15 @@ class Worker:
         assert into is not None
         assert out is not None
         try:
-            _send(into, pickle.dumps(job))
-            kind, content = _receive(out)
+            send(into, pickle.dumps(job))
+            kind, content = receive(out)
             while kind == "progress":
                 tell(*content)
-                kind, content = _receive(out)
+                kind, content = receive(out)
         except (EOFError, BrokenPipeError, ValueError, OSError):
             if self._process is not process:  # it was ended here
                 raise CancelledError("cancelled") from None
-            code = process.wait()
-            why = f"ended with status {code}"
-            if code < 0:
-                with contextlib.suppress(ValueError):
-                    why = f"was ended by {signal.Signals(-code).name}"
+            why = how_it_ended(process.wait())
             raise WorkerDiedError(f"the worker process {why}; try again") from None
         if kind == "failed":
             raise content
@@ -145,32 +121,27 @@ class Worker:
 def _buried(process: subprocess.Popen[bytes]) -> None:
     """Wait for a process that was ended, and close what led to it."""
     process.wait()
-    for stream in (process.stdin, process.stdout):
-        if stream is not None:
-            with contextlib.suppress(OSError, ValueError):
-                stream.close()
+    close(process)
 
 
 def serve() -> None:
     """Do jobs until the other end is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page decides what Ctrl-C means
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever somebody prints must not come among the answers
+    jobs, answers = served()
     warnings.simplefilter("ignore")  # the page has told what there was to warn of
     from .jobs import JOBS
 
     def tell(stage: str, done: int, total: int) -> None:
-        _send(answers, pickle.dumps(("progress", (stage, done, total))))
+        send(answers, pickle.dumps(("progress", (stage, done, total))))
 
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
-            name, arguments = _receive(sys.stdin.buffer)
+            name, arguments = receive(jobs)
             try:
                 found = "done", JOBS[name](*arguments, tell)
                 packed = pickle.dumps(found)
             except Exception as error:
                 packed = _failure(error)
-            _send(answers, packed)
+            send(answers, packed)
 
 
 def _failure(error: Exception) -> bytes:
@@ -180,23 +151,3 @@ def _failure(error: Exception) -> bytes:
         pickle.loads(packed)
         return packed
     return pickle.dumps(("failed", StillhookError(f"{type(error).__name__}: {error}")))
-
-
-def _send(stream: IO[bytes], data: bytes) -> None:
-    stream.write(_LENGTH.pack(len(data)) + data)
-    stream.flush()
-
-
-def _receive(stream: IO[bytes]) -> Any:
-    """Read what was pickled and written with `_send`.
-
-    Raises EOFError if the other end is gone.
-    """
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        raise EOFError
-    (length,) = _LENGTH.unpack(head)
-    data = stream.read(length)
-    if len(data) < length:
-        raise EOFError
-    return pickle.loads(data)

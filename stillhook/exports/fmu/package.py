@@ -8,7 +8,6 @@ The model's C is what `slave.c` asks for in ``model.h``: `model_header` writes i
 from __future__ import annotations
 
 import io
-import subprocess
 import sys
 import tempfile
 import zipfile
@@ -17,8 +16,8 @@ from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 
-from models.basics import InputError, SolverError
-from models.simulation import Compiler, find_compiler
+from models.basics import InputError
+from models.simulation import Compiler, compile_into, find_compiler
 
 from .description import Description, guid_of, model_description, osp_description
 
@@ -29,7 +28,6 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibili
 
 HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 SLAVE = "slave.c"
-_LIMIT = 600.0  # of one compilation [s]
 _STAMP = (1980, 1, 1, 0, 0, 0)  # of every file in the archive: the same export, the same bytes
 _README = """\
 {name}: sources of an FMU (FMI 2.0 for Co-Simulation), written by Stillhook.
@@ -189,29 +187,15 @@ def _library(
     Raises SolverError if the compiler fails; what it says is quoted.
     """
     with tempfile.TemporaryDirectory(prefix="stillhook-") as scratch:
-        folder = Path(scratch)
-        for path, content in sources.items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_bytes(content.encode() if isinstance(content, str) else content)
-        built = f"{name}{_platform()[1]}"
-        command = [*compiler.command, *FLAGS, "-o", built, *compiled]
-        try:
-            answer = subprocess.run(
-                [*command, *_linked(links), "-lm"],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                encoding="utf-8",
-                errors="replace",
-                timeout=_LIMIT,
-                check=False,
-            )
-        except (OSError, subprocess.SubprocessError) as error:
-            raise SolverError(f"export: fmu: the compiler failed: {error}") from error
-        if answer.returncode != 0 or not (folder / built).exists():
-            said = " ".join(answer.stderr.split())[:300]
-            raise SolverError(f"export: fmu: it cannot be compiled: {said}")
-        return (folder / built).read_bytes()
+        built = compile_into(
+            Path(scratch),
+            sources,
+            [*FLAGS, *compiled, *_linked(links), "-lm"],
+            f"{name}{_platform()[1]}",
+            compiler,
+            failure="export: fmu: it cannot be compiled",
+        )
+        return built.read_bytes()
 
 
 def _linked(links: Sequence[str]) -> list[str]:
